@@ -1,0 +1,1 @@
+"""Rendered videos of manipulation tasks, labelled by the expert."""

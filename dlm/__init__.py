@@ -1,0 +1,1 @@
+"""Differentiable learning of manipulation from video (Thesis Ch. 4)."""

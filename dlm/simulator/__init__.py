@@ -1,0 +1,1 @@
+"""Batched, differentiable planar contact simulator (Thesis 4-CT8..4-CT10)."""

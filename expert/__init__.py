@@ -1,0 +1,1 @@
+"""Model-based planning and certification for point fingers that move a polygon in the plane."""

@@ -1,0 +1,1 @@
+"""Contact-trajectory optimization (Thesis 3.1)."""

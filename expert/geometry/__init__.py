@@ -1,0 +1,1 @@
+"""Exact planar geometry: poses, polygons, convex covers.  Shared by solvers and checkers alike."""

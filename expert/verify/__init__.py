@@ -1,0 +1,1 @@
+"""Checkers that share only geometry and mechanics with the solvers they check."""
