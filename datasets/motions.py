@@ -1,0 +1,257 @@
+"""Random object motions in the sagittal plane that start at rest on the floor and end at rest (Thesis 4.3).
+
+Six families: slide, pivot about a ground vertex, lift, lift and rotate, slide then lift, pivot then lift.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from datasets.shapes import Shapes, sample_polygon, stable_angles
+from expert.errors import InvalidProblem
+from expert.geometry.pose import Array, rotation, to_world
+from expert.types import (
+    Body,
+    ContactTask,
+    Environment,
+    Fingers,
+    HalfPlane,
+    Robustness,
+    Trajectory,
+    require,
+)
+
+ATTEMPTS = 200
+AIR = 1e-3
+"""Height over the floor that whatever leaves it, or comes near it, has at the end [m]."""
+BETWEEN = 4
+"""Points per step at which a motion is held against the floor."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Phase:
+    """Rotation by `angle` [rad] about `pivot` (world frame; None: the centre of mass) together with a translation [m]."""
+
+    shift: Array = field(default_factory=lambda: np.zeros(2))
+    angle: float = 0.0
+    pivot: Array | None = None
+
+    def after(self, pose: Array, share: float) -> Array:
+        """Pose (3,) once this share of the phase is done, starting from `pose`."""
+        centre = pose[:2] if self.pivot is None else self.pivot
+        angle = share * self.angle
+        turned = centre + rotation(angle) @ (pose[:2] - centre)
+        return np.array([*(turned + share * self.shift), pose[2] + angle])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rest:
+    """An object at rest: its pose, and the outermost points (2,) of its line of contact with the floor, world frame."""
+
+    pose: Array
+    left: Array
+    right: Array
+
+    @classmethod
+    def of(cls, body: Body, angle: float) -> "Rest":
+        """Body turned by `angle`, lowered on the floor y = 0, its centre of mass at x = 0."""
+        turned = to_world([0.0, 0.0, angle], body.vertices)
+        pose = np.array([0.0, -turned[:, 1].min(), angle])
+        corners = to_world(pose, body.vertices)
+        touching = corners[corners[:, 1] < 1e-5 * body.size]
+        return cls(pose=pose, left=touching[touching[:, 0].argmin()], right=touching[touching[:, 0].argmax()])
+
+
+def _slide(rng: np.random.Generator, rest: Rest) -> list[Phase]:
+    return [_translation(_either_way(rng, 0.01, 0.04), 0.0)]
+
+
+def _pivot(rng: np.random.Generator, rest: Rest) -> list[Phase]:
+    return [_tilt(rest, _either_way(rng, 0.1, 0.5))]
+
+
+def _lift(rng: np.random.Generator, rest: Rest) -> list[Phase]:
+    return [_translation(rng.uniform(-0.03, 0.03), rng.uniform(0.01, 0.04))]
+
+
+def _lift_rotate(rng: np.random.Generator, rest: Rest) -> list[Phase]:
+    (lift,) = _lift(rng, rest)
+    return [Phase(shift=lift.shift, angle=_either_way(rng, 0.1, 0.5))]
+
+
+def _slide_lift(rng: np.random.Generator, rest: Rest) -> list[Phase]:
+    return [_translation(_either_way(rng, 0.008, 0.025), 0.0), _translation(0.0, rng.uniform(0.008, 0.025))]
+
+
+def _pivot_lift(rng: np.random.Generator, rest: Rest) -> list[Phase]:
+    """The centre of mass covers 0.8 to 2.5 cm in each phase.  Empty where no angle does that."""
+    direction = _either_way(rng, 1.0, 1.0)
+    radius = float(np.linalg.norm(rest.pose[:2] - _pivot_point(rest, direction)))
+    least, most = max(0.1, 0.008 / radius), min(0.5, 0.025 / radius)
+    if least > most:
+        return []
+    return [_tilt(rest, direction * rng.uniform(least, most)), _translation(0.0, rng.uniform(0.008, 0.025))]
+
+
+FAMILIES: dict[str, Callable[[np.random.Generator, Rest], list[Phase]]] = {
+    "slide": _slide,
+    "pivot": _pivot,
+    "lift": _lift,
+    "lift_rotate": _lift_rotate,
+    "slide_lift": _slide_lift,
+    "pivot_lift": _pivot_lift,
+}
+
+
+def _either_way(rng: np.random.Generator, least: float, most: float) -> float:
+    return float(rng.choice([-1.0, 1.0]) * rng.uniform(least, most))
+
+
+def _translation(x: float, y: float) -> Phase:
+    return Phase(shift=np.array([x, y]))
+
+
+def _pivot_point(rest: Rest, angle: float) -> Array:
+    """Counter-clockwise about the left end of the contact line, clockwise about the right end."""
+    return rest.left if angle > 0 else rest.right
+
+
+def _tilt(rest: Rest, angle: float) -> Phase:
+    return Phase(angle=angle, pivot=_pivot_point(rest, angle))
+
+
+def timed(share: float) -> float:
+    """Smooth step from rest to rest: 3 s^2 - 2 s^3."""
+    return share * share * (3 - 2 * share)
+
+
+def poses_of(start: Array, phases: list[Phase], steps: int) -> Array:
+    """Poses (steps, 3) at equal times; the phases follow one another, each from rest to rest in its share of the time."""
+    poses, pose = [], np.asarray(start, dtype=float)
+    clock = np.arange(steps) * len(phases) / (steps - 1)
+    for k, phase in enumerate(phases):
+        during = clock[(clock >= k) & ((clock < k + 1) | (k + 1 == len(phases)))]
+        poses += [phase.after(pose, timed(t - k)) for t in during]
+        pose = phase.after(pose, 1.0)
+    return np.array(poses)
+
+
+def sample_motion(
+    rng: np.random.Generator,
+    body: Body,
+    family: str,
+    *,
+    steps: int = 5,
+    dt: float = 0.1,
+    spread: float = 0.01,
+) -> Trajectory:
+    """Motion of `family` from rest on a random stable side; its swept width is centred within `spread` [m] of x = 0.
+
+    Raises InvalidProblem for an unknown family, or a body that no motion of the family suits.
+    """
+    require(family in FAMILIES, "family", "one of " + ", ".join(FAMILIES), family)
+    require(steps >= 5 and steps % 2 == 1, "steps", "an odd number >= 5, so that two phases share it", steps)
+    angles = stable_angles(body.vertices, np.zeros(2))
+    for _ in range(ATTEMPTS if len(angles) else 0):
+        rest = Rest.of(body, float(rng.choice(angles)))
+        phases = FAMILIES[family](rng, rest)
+        if not phases:
+            continue
+        swept = to_world(poses_of(rest.pose, phases, BETWEEN * (steps - 1) + 1), body.vertices)
+        if _clears_floor(swept, phases[-1]):
+            poses = poses_of(rest.pose, phases, steps)
+            poses[:, 0] += rng.uniform(-spread, spread) - (swept[..., 0].min() + swept[..., 0].max()) / 2
+            return Trajectory.of(poses, dt, "rest")
+    raise InvalidProblem(
+        "object", expected=f"a shape with room for the motion {family}", got=f"none in {ATTEMPTS} draws"
+    )
+
+
+def _clears_floor(swept: Array, last: Phase) -> bool:
+    """No vertex of the swept polygons (n, V, 2) enters the floor, and what a last tilt or lift raises ends well above it."""
+    heights = swept[..., 1]
+    if heights.min() < -1e-9:
+        return False
+    slides = last.pivot is None and last.shift[1] == 0
+    aloft = np.sort(heights[-1])[1 if last.pivot is not None else 0 :]
+    return bool(slides or aloft.min() >= AIR)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tasks:
+    """What is common to the tasks of a data set.  SI units; friction for fingers and floor alike.
+
+    steps T and dt [s]: the video's frames.  force_limit: largest normal force of a finger over m g.  facet_margin,
+    clearance [m]: see Fingers.  The rest: see Robustness; least_push is its min_normal_force over m g.
+    """
+
+    mass: float = 0.1
+    friction: float = 0.5
+    gravity: float = 9.81
+    steps: int = 5
+    dt: float = 0.1
+    fingers: int = 2
+    force_limit: float = 10.0
+    facet_margin: float = 0.05
+    clearance: float = 0.005
+    cone_fraction: float = 0.7
+    support_inset: float = 0.3
+    min_interval: int = 2
+    least_push: float = 0.04
+
+    def __post_init__(self) -> None:
+        require(0 < self.mass < np.inf, "tasks.mass", "a positive number of kilograms", self.mass)
+        require(0 < self.gravity < np.inf, "tasks.gravity", "a positive number", self.gravity)
+        require(
+            0 <= self.least_push < self.force_limit,
+            "tasks.least_push",
+            "less than force_limit",
+            self.least_push,
+        )
+
+    def task(self, body: Body, trajectory: Trajectory) -> ContactTask:
+        """The task of moving `body` along `trajectory` over the floor y = 0."""
+        weight = self.mass * self.gravity
+        floor = HalfPlane(point=np.zeros(2), normal=np.array([0.0, 1.0]), friction=self.friction)
+        return ContactTask(
+            body=body,
+            environment=Environment(gravity=self.gravity, walls=(floor,)),
+            trajectory=trajectory,
+            fingers=Fingers(
+                count=self.fingers,
+                friction=self.friction,
+                max_force=self.force_limit * weight,
+                facet_margin=self.facet_margin,
+                clearance=self.clearance,
+            ),
+            robustness=Robustness(
+                cone_fraction=self.cone_fraction,
+                support_inset=self.support_inset,
+                min_normal_force=self.least_push * weight,
+                min_interval=self.min_interval,
+            ),
+        )
+
+
+def sample_task(
+    rng: np.random.Generator, family: str, shapes: Shapes | None = None, tasks: Tasks | None = None
+) -> ContactTask:
+    """A random object and a random motion of `family`; the body frame is parallel to the world's at the first pose.
+
+    Vertex 0 is the left end of the line on which the object rests.  Raises InvalidProblem as its parts do.
+    """
+    shapes, tasks = shapes or Shapes(), tasks or Tasks()
+    body, _ = Body.uniform(sample_polygon(rng, shapes), tasks.mass)
+    motion = sample_motion(rng, body, family, steps=tasks.steps, dt=tasks.dt)
+    return tasks.task(*upright(body, motion))
+
+
+def upright(body: Body, motion: Trajectory) -> tuple[Body, Trajectory]:
+    """The same motion in a body frame that is parallel to the world's at the first pose; vertex 0 lies lowest, then leftmost."""
+    angle = motion.poses[0, 2]
+    corners = to_world([0.0, 0.0, angle], body.vertices)
+    low = np.flatnonzero(corners[:, 1] < corners[:, 1].min() + 1e-5 * body.size)
+    first = int(low[corners[low, 0].argmin()])
+    turned = Body(vertices=np.roll(corners, -first, axis=0), mass=body.mass, inertia=body.inertia)
+    return turned, Trajectory.of(motion.poses - [0.0, 0.0, angle], motion.dt, "rest")
