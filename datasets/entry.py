@@ -1,0 +1,63 @@
+"""Hydra entry points that end with one line and a telling exit code: 2 for bad input, 130 when interrupted."""
+
+import functools
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import ParamSpec
+
+import hydra
+from hydra.errors import HydraException
+from omegaconf import DictConfig
+from omegaconf.errors import OmegaConfBaseException
+
+from expert.errors import ExpertError, InvalidProblem
+
+CONFIGS = Path(__file__).resolve().parent.parent / "configs"
+BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130
+
+P = ParamSpec("P")
+Job = Callable[[DictConfig], None]
+
+
+def entry_point(config: str) -> Callable[[Job], Callable[[], None]]:
+    """Make `job` a command configured by configs/<config>.yaml and the overrides of its command line."""
+
+    def decorate(job: Job) -> Callable[[], None]:
+        command = hydra.main(version_base=None, config_path=str(CONFIGS), config_name=config)(_one_line(job))
+        return _one_line(command)
+
+    return decorate
+
+
+def _one_line(function: Callable[P, None]) -> Callable[P, None]:
+    """`function`, with expected errors turned into one line on stderr and an exit code."""
+
+    @functools.wraps(function)
+    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        os.environ["HYDRA_FULL_ERROR"] = "1"  # or Hydra prints its own report and leaves with code 1
+        try:
+            function(*args, **kwargs)
+        except (ExpertError, HydraException, OmegaConfBaseException) as error:
+            cause = _cause(error)
+            print(f"error: {' '.join(str(cause).split())}", file=sys.stderr)
+            sys.exit(FAILED if _is_failure(cause) else BAD_INPUT)
+        except KeyboardInterrupt:
+            sys.exit(INTERRUPTED)
+
+    return run
+
+
+def _cause(error: BaseException) -> BaseException:
+    """The first error of ours in a chain; Hydra wraps what a constructor raises."""
+    link: BaseException | None = error
+    while link is not None:
+        if isinstance(link, ExpertError):
+            return link
+        link = link.__cause__
+    return error
+
+
+def _is_failure(error: BaseException) -> bool:
+    return isinstance(error, ExpertError) and not isinstance(error, InvalidProblem)

@@ -1,0 +1,150 @@
+"""Checkpoints: one safetensors file per stage, replaced as a whole, whose header says what made it.
+
+Tensors `model.<name>`, `optimiser.<name>` and `random`; JSON text under `about` in the header.
+A file holds all that training needs to go on as if it had never stopped.
+"""
+
+import json
+import os
+import platform
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch import Tensor
+
+from expert.errors import InvalidProblem
+
+SCHEMA = 1
+PACKAGES = ("certified-manipulation", "torch", "numpy", "cvxpy", "cvxpylayers", "diffcp", "clarabel", "numba")
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that decide the numbers."""
+    return {"python": platform.python_version(), **{name: version(name) for name in PACKAGES}}
+
+
+@dataclass(frozen=True, kw_only=True)
+class About:
+    """What made a checkpoint.
+
+    model: architecture, by name.  settings: all training settings as plain values.  data: fingerprint of the training data.
+    history: one row of named losses per logged iteration.
+    """
+
+    stage: str
+    model: str
+    iteration: int
+    settings: dict[str, object]
+    data: str
+    history: list[dict[str, float]]
+    versions: dict[str, str] = field(default_factory=versions)
+    schema: int = SCHEMA
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checkpoint:
+    """State of one training stage: weights, optimiser moments, state of the random generator."""
+
+    about: About
+    model: dict[str, Tensor]
+    optimiser: dict[str, Tensor]
+    random: Tensor
+
+    def save(self, path: Path) -> None:
+        """Write the file whole or not at all."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        tensors = {f"model.{k}": v for k, v in self.model.items()}
+        tensors |= {f"optimiser.{k}": v for k, v in self.optimiser.items()}
+        tensors["random"] = self.random
+        draft = path.with_name(f".{path.name}.{os.getpid()}")
+        try:
+            contiguous = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
+            save_file(contiguous, draft, metadata={"about": json.dumps(asdict(self.about))})
+            os.replace(draft, path)
+        finally:
+            draft.unlink(missing_ok=True)
+
+
+def load(path: Path, *, command: str) -> Checkpoint:
+    """Read a checkpoint.  Raises InvalidProblem with the command that makes it where it is missing or damaged."""
+    about = read_about(path, command=command)
+    with safe_open(path, framework="pt") as file:
+        tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118: not a mapping
+    return Checkpoint(
+        about=about,
+        model=_part(tensors, "model."),
+        optimiser=_part(tensors, "optimiser."),
+        random=tensors["random"],
+    )
+
+
+def read_about(path: Path, *, command: str) -> About:
+    """Only the header of a checkpoint.  Raises InvalidProblem as `load` does."""
+    if not path.is_file():
+        raise InvalidProblem(
+            "checkpoint", expected=f"the file {path}", got="no such file", remedy=f"make it with: {command}"
+        )
+    try:
+        with safe_open(path, framework="pt") as file:
+            about = json.loads((file.metadata() or {})["about"])
+        if about.get("schema") != SCHEMA:
+            raise InvalidProblem(
+                f"checkpoint {path}",
+                expected=f"schema {SCHEMA}",
+                got=f"schema {about.get('schema')}",
+                remedy=f"make it again with: {command}",
+            )
+        return About(**about)
+    except (SafetensorError, KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InvalidProblem(
+            f"checkpoint {path}",
+            expected="a whole checkpoint file",
+            got=f"{type(error).__name__}: {error}".splitlines()[0],
+            remedy=f"make it again with: {command}",
+        ) from error
+
+
+def _part(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:
+    return {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
+
+
+def optimiser_tensors(optimiser: torch.optim.Optimizer) -> dict[str, Tensor]:
+    """State of an optimiser as named tensors `<parameter>.<quantity>`; step sizes and the like belong to the settings."""
+    state = optimiser.state_dict()["state"]
+    return {f"{index}.{name}": value for index, row in state.items() for name, value in row.items()}
+
+
+def restore_optimiser(optimiser: torch.optim.Optimizer, tensors: Mapping[str, Tensor]) -> None:
+    """Inverse of `optimiser_tensors`."""
+    state: dict[int, dict[str, Tensor]] = {}
+    for key, value in tensors.items():
+        index, name = key.split(".", 1)
+        state.setdefault(int(index), {})[name] = value
+    optimiser.load_state_dict({"state": state, "param_groups": optimiser.state_dict()["param_groups"]})
+
+
+def restore_model(model: torch.nn.Module, checkpoint: Checkpoint, *, name: str, source: Path) -> None:
+    """Load weights into a model called `name`.  Raises InvalidProblem for the checkpoint of another model."""
+    if checkpoint.about.model != name:
+        raise InvalidProblem(
+            f"checkpoint {source}",
+            expected=f"weights of model {name}",
+            got=f"weights of model {checkpoint.about.model}",
+            remedy="choose the model that was trained, or another output folder",
+        )
+    wanted = {key: tuple(value.shape) for key, value in model.state_dict().items()}
+    found = {key: tuple(value.shape) for key, value in checkpoint.model.items()}
+    if odd := sorted(set(wanted.items()) ^ set(found.items())):
+        key = odd[0][0]
+        raise InvalidProblem(
+            f"checkpoint {source}",
+            expected=f"{key} of shape {wanted.get(key, 'none')}",
+            got=f"shape {found.get(key, 'none')}",
+            remedy="it was trained with other settings; train again",
+        )
+    model.load_state_dict(checkpoint.model)
