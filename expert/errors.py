@@ -10,7 +10,8 @@ class InvalidProblem(ExpertError):
 
     def __init__(self, field: str, *, expected: str, got: str, remedy: str = "") -> None:
         self.field, self.expected, self.got, self.remedy = field, expected, got, remedy
-        super().__init__(f"{field}: expected {expected}, got {got}" + (f"; {remedy}" if remedy else ""))
+        line = f"{field}: expected {expected}, got {got}" + (f"; {remedy}" if remedy else "")
+        super().__init__(" ".join(line.split()))
 
     def __reduce__(self) -> tuple:
         return _rebuild, (type(self), self.field, self.expected, self.got, self.remedy)
