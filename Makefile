@@ -1,7 +1,9 @@
 PYTHON ?= python3
 BIN := .venv/bin
+# `make demo EXPERIMENT=smoke` goes through the same steps on 6 tasks and 2 iterations, in a minute.
+EXPERIMENT ?= thesis
 
-.PHONY: setup demo test lint bench report clean
+.PHONY: setup demo report test lint bench clean
 setup: .venv/installed
 
 .venv/installed: pyproject.toml
@@ -10,6 +12,14 @@ setup: .venv/installed
 	$(BIN)/pip install --quiet torch==2.13.0
 	$(BIN)/pip install --quiet --editable '.[dev]'
 	touch $@
+
+demo: setup
+	$(BIN)/python -m datasets.generate experiment=$(EXPERIMENT)
+	$(BIN)/python train.py stage=all experiment=$(EXPERIMENT) resume=true
+	$(BIN)/python evaluate.py experiment=$(EXPERIMENT)
+
+report: setup
+	$(BIN)/python evaluate.py experiment=$(EXPERIMENT)
 
 test: setup
 	$(BIN)/python -m pytest
@@ -20,6 +30,11 @@ lint: setup
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/codespell expert datasets dlm tests docs configs README.md CHANGELOG.md train.py evaluate.py
+
+bench: setup
+	@status=0; for file in tests/benchmarks/[a-z]*.py; do \
+		name=$$(basename $$file .py); echo "== $$name"; \
+		$(BIN)/python -m tests.benchmarks.$$name $(BENCH) || status=1; done; exit $$status
 
 clean:
 	rm -rf .venv .mypy_cache .pytest_cache .ruff_cache .import_linter_cache *.egg-info

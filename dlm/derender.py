@@ -1,11 +1,13 @@
 """Mechanical derendering: from video frames to mechanical parameters (Thesis 4-CT3, 4-CT4)."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
+from math import ceil, prod
 
 import torch
 from torch import Tensor, nn
+
+from dlm.parameters import FLAGS, Layout, MechanicalParameters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,32 +19,28 @@ class NetworkSizes:
     recurrent_layers: int = 5
     hidden_layers: int = 3
     dropout: float = 0.2
+    pixels: int = 50
+    steps: int = 5
 
 
-def mlp(inputs: int, outputs: int, sizes: NetworkSizes) -> nn.Sequential:
-    """Perceptron over the last axis of (N, inputs) with batch norm, ReLU and dropout after each hidden layer."""
-    hidden: list[nn.Module] = []
-    for _ in range(sizes.hidden_layers):
-        hidden += [
-            nn.Linear(inputs, inputs),
-            nn.BatchNorm1d(inputs),
-            nn.ReLU(),
-            nn.Dropout(sizes.dropout),
-        ]
-    return nn.Sequential(*hidden, nn.Linear(inputs, outputs))
+def perceptron(inputs: int, outputs: int, sizes: NetworkSizes) -> nn.Sequential:
+    """Map of rows (n, inputs) to (n, outputs); batch norm, ReLU and dropout after each hidden layer."""
+    hidden = [
+        (nn.Linear(inputs, inputs), nn.BatchNorm1d(inputs), nn.ReLU(), nn.Dropout(sizes.dropout))
+        for _ in range(sizes.hidden_layers)
+    ]
+    return nn.Sequential(*chain.from_iterable(hidden), nn.Linear(inputs, outputs))
 
 
 class VideoEncoder(nn.Module):
     """4-CT3: L = LSTM(CNN(I_1), ..., CNN(I_T)), forwards and backwards in time."""
 
-    def __init__(self, sizes: NetworkSizes, *, pixels: int = 50) -> None:
+    def __init__(self, sizes: NetworkSizes) -> None:
         super().__init__()
-        steps = pairwise((3, *sizes.channels))
-        layers = [[nn.Conv2d(i, o, 3, stride=2, padding=1), nn.ReLU()] for i, o in steps]
-        self.cnn = nn.Sequential(*sum(layers, []), nn.Flatten())
-        side = pixels
-        for _ in sizes.channels:
-            side = (side + 1) // 2
+        channels = pairwise((3, *sizes.channels))
+        layers = [(nn.Conv2d(i, o, 3, stride=2, padding=1), nn.ReLU()) for i, o in channels]
+        self.cnn = nn.Sequential(*chain.from_iterable(layers), nn.Flatten())
+        side = ceil(sizes.pixels / 2 ** len(sizes.channels))
         self.lstm = nn.LSTM(
             sizes.channels[-1] * side**2,
             sizes.latent,
@@ -53,60 +51,41 @@ class VideoEncoder(nn.Module):
         self.join = nn.Linear(2 * sizes.latent, sizes.latent)
 
     def forward(self, video: Tensor) -> Tensor:
-        """Frames (B, T, H, W, 3), uint8, to latents (B, T, latent)."""
-        b, t = video.shape[:2]
+        """Frames (b, t, h, w, 3), uint8, to latents (b, t, latent), float32."""
         images = video.flatten(0, 1).permute(0, 3, 1, 2).float() / 255 - 0.5
-        frames = self.cnn(images).unflatten(0, (b, t))
+        frames = self.cnn(images).unflatten(0, video.shape[:2])
         return self.join(self.lstm(frames)[0])
 
 
 class Derenderer(nn.Module):
-    """4-CT4: P*(t) = MLP_P(L)(t), one head per kind of parameter, in standard units (mean 0, deviation 1)."""
+    """4-CT4: P*(t) = MLP_P(L)(t), one head per field of P.
 
-    def __init__(self, widths: Mapping[str, int], sizes: NetworkSizes) -> None:
-        super().__init__()
-        self.encoder = VideoEncoder(sizes)
-        self.heads = nn.ModuleDict({name: mlp(sizes.latent, n, sizes) for name, n in widths.items()})
-
-    def forward(self, video: Tensor) -> dict[str, Tensor]:
-        """Frames (B, T, H, W, 3) to standardised parameters by name, each (B, T, width), float32."""
-        latent = self.encoder(video)
-        rows = latent.flatten(0, 1)
-        return {name: head(rows).unflatten(0, latent.shape[:2]) for name, head in self.heads.items()}
-
-
-class Standardiser(nn.Module):
-    """Affine map between physical values (B, T, width) and standard units, fitted to a training set and saved with the weights.
-
-    Each step and coordinate has its own mean; one deviation per kind, so that metres weigh alike in all coordinates.
+    The heads give the deviation from the mean parameters of the training set (`centre`, saved with the weights),
+    so that an untrained network starts from an average task.
     """
 
-    def __init__(self, widths: Mapping[str, int], steps: int) -> None:
+    centre: Tensor
+
+    def __init__(self, layout: Layout, sizes: NetworkSizes) -> None:
         super().__init__()
-        for name, width in widths.items():
-            self.register_buffer(f"{name}_mean", torch.zeros(steps, width, dtype=torch.float64))
-            self.register_buffer(f"{name}_scale", torch.ones((), dtype=torch.float64))
+        self.layout = layout
+        self.encoder = VideoEncoder(sizes)
+        widths = {name: prod(shape) for name, shape in layout.shapes.items()}
+        self.heads = nn.ModuleDict({n: perceptron(sizes.latent, w, sizes) for n, w in widths.items()})
+        self.register_buffer("centre", torch.zeros(sizes.steps, layout.width))
 
-    def fit(self, values: Mapping[str, Tensor]) -> None:
-        """Take mean and deviation over the tasks of a training set."""
-        for name, value in values.items():
-            mean = value.double().mean(0)
-            self.get_buffer(f"{name}_mean").copy_(mean)
-            scale = (value.double() - mean).square().mean().sqrt()
-            self.get_buffer(f"{name}_scale").copy_(scale if scale > 1e-9 else torch.ones(()))
+    def fit_centre(self, parameters: MechanicalParameters) -> None:
+        """Take the mean over the tasks of a training set; flags in logits."""
+        mean = self.layout.split(self.layout.flatten(parameters).mean(0))
+        rows = [x.logit(eps=0.02) if name in FLAGS else x for name, x in mean.items()]
+        self.centre.copy_(torch.cat([x.flatten(1) for x in rows], dim=-1))
 
-    def standard(self, values: Mapping[str, Tensor]) -> dict[str, Tensor]:
-        """Physical values to standard units, float32."""
-        return {
-            name: (
-                (value.double() - self.get_buffer(f"{name}_mean")) / self.get_buffer(f"{name}_scale")
-            ).float()
-            for name, value in values.items()
-        }
+    def forward(self, video: Tensor) -> Tensor:
+        """Frames (b, t, h, w, 3) to rows (b, t, width) of the layout, float32: scaled, flags from 0 to 1."""
+        rows = self.encoder(video).flatten(0, 1)
+        deviation = torch.cat([head(rows) for head in self.heads.values()], dim=-1)
+        return self.layout.squash(self.centre + deviation.unflatten(0, video.shape[:2]))
 
-    def physical(self, values: Mapping[str, Tensor]) -> dict[str, Tensor]:
-        """Standard units to physical values, float64."""
-        return {
-            name: self.get_buffer(f"{name}_mean") + self.get_buffer(f"{name}_scale") * value.double()
-            for name, value in values.items()
-        }
+    def parameters_of(self, video: Tensor) -> MechanicalParameters:
+        """P* of each video, SI units, float64."""
+        return self.layout.unflatten(self(video).double())
