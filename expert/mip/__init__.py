@@ -1,0 +1,1 @@
+"""Mixed-integer models that read like the equations: implications with derived constants, envelopes, honest results."""
