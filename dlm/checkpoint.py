@@ -74,7 +74,7 @@ def load(path: Path, *, command: str) -> Checkpoint:
     """Read a checkpoint.  Raises InvalidProblem with the command that makes it where it is missing or damaged."""
     about = read_about(path, command=command)
     with safe_open(path, framework="pt") as file:
-        tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118: not a mapping
+        tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (not a mapping)
     return Checkpoint(
         about=about,
         model=_part(tensors, "model."),

@@ -7,7 +7,7 @@ from math import ceil, prod
 import torch
 from torch import Tensor, nn
 
-from dlm.parameters import FLAGS, Layout, MechanicalParameters
+from dlm.parameters import FLAGS, Layout, ParameterBatch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +74,7 @@ class Derenderer(nn.Module):
         self.heads = nn.ModuleDict({n: perceptron(sizes.latent, w, sizes) for n, w in widths.items()})
         self.register_buffer("centre", torch.zeros(sizes.steps, layout.width))
 
-    def fit_centre(self, parameters: MechanicalParameters) -> None:
+    def fit_centre(self, parameters: ParameterBatch) -> None:
         """Take the mean over the tasks of a training set; flags in logits."""
         mean = self.layout.split(self.layout.flatten(parameters).mean(0))
         rows = [x.logit(eps=0.02) if name in FLAGS else x for name, x in mean.items()]
@@ -86,6 +86,6 @@ class Derenderer(nn.Module):
         deviation = torch.cat([head(rows) for head in self.heads.values()], dim=-1)
         return self.layout.squash(self.centre + deviation.unflatten(0, video.shape[:2]))
 
-    def parameters_of(self, video: Tensor) -> MechanicalParameters:
+    def parameters_of(self, video: Tensor) -> ParameterBatch:
         """P* of each video, SI units, float64."""
         return self.layout.unflatten(self(video).double())

@@ -1,0 +1,85 @@
+"""Labelled tasks as tensors: what policies see, what losses compare with, and the scenes in which actions are executed."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from datasets.specification import Sample
+from datasets.store import read_dataset
+from dlm.parameters import ParameterBatch
+from dlm.simulator.scene import SceneBatch
+from expert.types import require
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskBatch:
+    """b tasks; t step, c finger, d coordinate.
+
+    video (b, t, h, w, 3) uint8; parameters P; positions, forces (b, t, c, d) of the expert's plans; weight (b,) m g [N], size (b,) of the objects [m];
+    scenes: objects, environments and desired motions; samples: the tasks themselves; fingerprint: of the whole data set.
+    """
+
+    video: Tensor
+    parameters: ParameterBatch
+    positions: Tensor
+    forces: Tensor
+    weight: Tensor
+    size: Tensor
+    scenes: SceneBatch
+    samples: tuple[Sample, ...]
+    fingerprint: str
+
+    @classmethod
+    def of(cls, samples: Sequence[Sample], fingerprint: str = "") -> "TaskBatch":
+        """Stack samples.  Raises InvalidProblem for none."""
+        require(len(samples) > 0, "dataset", "at least one task", 0)
+        return cls(
+            video=torch.from_numpy(np.stack([s.video for s in samples])),
+            parameters=ParameterBatch.stack([s.parameters for s in samples]),
+            positions=torch.from_numpy(np.stack([s.plan.positions for s in samples])),
+            forces=torch.from_numpy(np.stack([s.plan.forces for s in samples])),
+            weight=torch.tensor([s.task.weight for s in samples], dtype=torch.float64),
+            size=torch.tensor([s.task.body.size for s in samples], dtype=torch.float64),
+            scenes=SceneBatch.of([s.task for s in samples]),
+            samples=tuple(samples),
+            fingerprint=fingerprint,
+        )
+
+    @classmethod
+    def read(cls, folder: str | Path) -> "TaskBatch":
+        """A whole data set.  Raises InvalidProblem where it is missing, unfinished, empty or damaged."""
+        data = read_dataset(folder)
+        return cls.of([data[i] for i in range(len(data))], data.sha256)
+
+    def __len__(self) -> int:
+        return len(self.samples)
+
+    def __getitem__(self, rows: Tensor) -> "TaskBatch":
+        """Some of the tasks, by number."""
+        index = rows.tolist()
+        return replace(
+            self,
+            video=self.video[rows],
+            parameters=self.parameters.map(lambda value: value[rows]),
+            positions=self.positions[rows],
+            forces=self.forces[rows],
+            weight=self.weight[rows],
+            size=self.size[rows],
+            scenes=self.scenes[index],
+            samples=tuple(self.samples[i] for i in index),
+        )
+
+    @property
+    def poses(self) -> Tensor:
+        """Desired poses (b, t, 3)."""
+        return torch.from_numpy(self.scenes.desired)
+
+
+def read_all(folders: Mapping[str, str | Path]) -> dict[str, TaskBatch]:
+    """Several data sets by name; a folder that is named twice is read once."""
+    read = {folder: TaskBatch.read(folder) for folder in dict.fromkeys(folders.values())}
+    return {name: read[folder] for name, folder in folders.items()}
