@@ -1,5 +1,6 @@
 """Mechanical parameters P(t) of a task (Thesis 4-CT4): all that the inverse dynamics must know to find the expert's plan."""
 
+import itertools
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -145,7 +146,7 @@ def intervals(mode: IntArray) -> list[slice]:
     """Maximal runs of equal entries."""
     cuts = np.flatnonzero(np.diff(mode)) + 1
     bounds = [0, *map(int, cuts), len(mode)]
-    return [slice(a, b) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
+    return [slice(a, b) for a, b in itertools.pairwise(bounds)]
 
 
 def _open_segments(task: ContactTask, facet: IntArray, plan: Plan) -> Array:

@@ -4,12 +4,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import torch
+from cvxpylayers.interfaces.base import SolverInterface
 from cvxpylayers.torch import CvxpyLayer
 from torch import Tensor, nn
 
 from dlm.parameters import ParameterBatch
 from dlm.qp_data import QPData, QPSize, QPWeights, qp_data
 from dlm.qp_diffcp import DiffcpClarabel
+from dlm.qp_kkt import InteriorPointKKT
 from dlm.qp_problem import inverse_dynamics_problem
 from expert.types import Cost, require
 
@@ -48,7 +50,7 @@ class InverseDynamics(nn.Module):
         torque: Torque = "first_order",
         backend: Backend = "cvxpylayers",
         slack: float | None = 100.0,
-        length: float = 0.1,
+        length: float = 0.01,
         force: float = 1.0,
     ) -> None:
         super().__init__()
@@ -57,7 +59,8 @@ class InverseDynamics(nn.Module):
         require(slack is None or slack > 0, "slack", "a positive number or None", slack)
         self.size, self.length, self.force, self.torque = size or QPSize(), length, force, torque
         weights = QPWeights.of(cost or Cost(), dt=dt, length=length, force=force, slack=slack)
-        self.program = CvxpyProgram(self.size, weights)
+        solver = DiffcpClarabel() if backend == "cvxpylayers" else InteriorPointKKT()
+        self.program = Program(self.size, weights, solver)
 
     def forward(self, parameters: ParameterBatch) -> Action:
         """The optimal action of every task of the batch."""
@@ -82,17 +85,17 @@ class InverseDynamics(nn.Module):
         require(got == self.size, "parameters", f"{self.size}", got)
 
 
-class CvxpyProgram(nn.Module):
-    """4-CT6 through cvxpylayers."""
+class Program(nn.Module):
+    """4-CT6 through cvxpylayers, solved and differentiated by `solver`."""
 
-    def __init__(self, size: QPSize, weights: QPWeights) -> None:
+    def __init__(self, size: QPSize, weights: QPWeights, solver: SolverInterface) -> None:
         super().__init__()
         problem, parameters, x = inverse_dynamics_problem(size, weights)
         self.layer = CvxpyLayer(
             problem,
             parameters=list(parameters.values()),
             variables=[x.p, x.lam, x.eps],
-            solver=DiffcpClarabel(),
+            solver=solver,
             canon_backend="SCIPY",
         )
 
