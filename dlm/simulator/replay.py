@@ -7,15 +7,14 @@ from numba import njit
 
 from dlm.metrics import object_trajectory_loss, rotation_error, translation_error
 from dlm.simulator.contact import View, view
-from dlm.simulator.execution import command, plan_commands
+from dlm.simulator.execution import command, desired_motion, plan_commands
 from dlm.simulator.gradient import loaded_flags
 from dlm.simulator.rollout import Motion, advance, motion_for, start_motion
 from dlm.simulator.scene import Scene, SceneBatch
 from dlm.simulator.settings import Physics, SimulatorSettings
 from dlm.simulator.step import Work, solve_step, work_for
-from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
-from expert.types import ContactTask, readonly
+from expert.types import ContactTask, readonly, require
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,30 +87,36 @@ def replay(
     first pose, by default the desired one.  Raises InvalidProblem for plans of a wrong shape or with nan.
     """
     settings = settings or SimulatorSettings()
+    commands, fingers = planned_commands(task, positions, forces, settings, contact=contact)
+    batch = SceneBatch.of([task])
+    scene, path = view(batch.arrays, 0), batch.desired[0]
+    size = float(np.sqrt(scene.inertia / scene.mass))
+    desired = desired_motion(path, scene.dt, size, settings.layers)
+    first = path[0] if start is None else readonly(start, (3,), "start")
+    return simulate(batch, commands, first, fingers, settings, desired=desired)
+
+
+def planned_commands(
+    task: ContactTask | Scene,
+    positions: Array,
+    forces: Array,
+    settings: SimulatorSettings,
+    *,
+    contact: np.ndarray | None = None,
+) -> tuple[Array, Array]:
+    """What the execution layer makes of a plan: commands (S + 1, C, 2) and the fingers' first positions (C, 2) [m]."""
     batch = SceneBatch.of([task])
     p = readonly(positions, (batch.steps, None, 2), "positions").copy()
     f = readonly(forces, (*p.shape[:2], 2), "forces").copy()
     flags = loaded_flags(batch, f[None])[0] if contact is None else np.array(contact, dtype=bool)
-    if flags.shape != p.shape[:2]:
-        raise InvalidProblem("contact", expected=f"shape {p.shape[:2]}", got=str(flags.shape))
-    first = batch.desired[0, 0].copy() if start is None else readonly(start, (3,), "start").copy()
-    scenes = batch.without_friction() if settings.frictionless else batch
-    scene, path = view(scenes.arrays, 0), batch.desired[0]
-    commands, fingers, desired = _commands(scene, path, p, f, flags, settings)
-    return simulate(scenes, commands, first, fingers, settings, desired=desired)
-
-
-def _commands(
-    scene: View, path: Array, p: Array, f: Array, flags: np.ndarray, settings: SimulatorSettings
-) -> tuple[Array, Array, Array]:
-    """Commands (S + 1, C, 2), first finger positions (C, 2) and desired poses (S + 1, 3)."""
-    table = plan_commands(scene, path, p, flags, settings.layers)
+    require(flags.shape == p.shape[:2], "contact", f"shape {p.shape[:2]}", flags.shape)
+    scene = view(batch.arrays, 0)
+    table = plan_commands(scene, batch.desired[0], p, flags, settings.layers)
     commands = np.zeros((len(table.frame), p.shape[1], 2))
     command(table, p, f, scene.stiffness, commands)
     motion = motion_for(len(commands), p.shape[1])
     start_motion(table, p, f, motion)
-    riding = settings.layers._replace(screw=True)
-    return commands, motion.fingers[0], plan_commands(scene, path, p, flags, riding).frame
+    return commands, motion.fingers[0]
 
 
 def simulate(
