@@ -101,7 +101,7 @@ class Program(nn.Module):
 
     def forward(self, data: QPData) -> tuple[Tensor, Tensor, Tensor]:
         """p, lambda and eps without dimensions; rows of nan where there is no solution."""
-        return tuple(self.layer(*data.tensors().values()))  # type: ignore[return-value]
+        return tuple(self.layer(*data.tensors().values()))
 
 
 def finite_rows(parameters: ParameterBatch) -> Tensor:

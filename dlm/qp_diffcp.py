@@ -42,8 +42,8 @@ class DiffcpClarabel(SolverInterface):
         """Primal (b, n), dual (b, m) and the adjoints of the solution maps."""
         with ThreadPoolExecutor(torch.get_num_threads()) as pool:
             solved = list(pool.map(self._solve, A.detach().numpy(), q.detach().numpy()[:, :-1]))
-        primal, dual = (torch.from_numpy(np.stack([s[i] for s in solved])) for i in (0, 1))
-        return primal, dual, [s[2] for s in solved]
+        primal, dual, adjoints = zip(*solved, strict=True)
+        return torch.from_numpy(np.stack(primal)), torch.from_numpy(np.stack(dual)), list(adjoints)
 
     def derivative_torch_batch(
         self, dprimal: Tensor, ddual: Tensor, saved_state: list[Adjoint | None]
