@@ -1,0 +1,92 @@
+"""The exact solver: contact positions and forces that make a motion, with a certified gap, or a proof that none do.
+
+No envelope: with w = rho lambda_n the wrench cone of a facet is convex (see `steps`), so what remains non-convex is one rho
+per contact interval, and a best-first search branches on modes, on rho and on free regions (see `search`).
+"""
+
+import time
+
+import numpy as np
+
+from expert.contact.model import Model, model_of
+from expert.contact.plan_at import finger_forces, positions_at
+from expert.contact.polish import polish as polished
+from expert.contact.reasons import why_infeasible
+from expert.contact.recovery import plan_cost, wrench_residual
+from expert.contact.search import Outcome, Search
+from expert.errors import SolverFailed
+from expert.geometry.pose import Array
+from expert.types import ContactTask, Plan, Status
+
+POLISH_ROUNDS = 60
+RESIDUAL = 1e-8
+"""Largest Newton-Euler residual of a plan that is handed out, over m g and m g L."""
+
+
+def solve(
+    task: ContactTask,
+    *,
+    gap: float = 1e-3,
+    time_limit: float = 60.0,
+    node_limit: int | None = None,
+    polish: bool = True,
+) -> Plan:
+    """Globally optimal plan (Thesis 3.1) to a relative `gap`; budgets in seconds and in nodes, the latter repeatable.
+
+    polish: finish at a stationary point of the cost at the best modes.  Raises SolverFailed where numerical failures
+    leave the task undecided.
+    """
+    start = time.perf_counter()
+    model = model_of(task)
+    search = Search(model, task.fingers.count, gap)
+    outcome = search.run(node_limit=node_limit, deadline=start + time_limit)
+    scale = task.weight**2
+    if outcome.best.sequence is None:
+        status, reason = _without_plan(task, model, search, outcome)
+        bound = np.inf if status == "infeasible" else outcome.bound * scale
+        return Plan(
+            status=status,
+            bound=bound,
+            seconds=time.perf_counter() - start,
+            nodes=outcome.nodes,
+            reason=reason,
+        )
+    z = outcome.best.z
+    if polish:
+        z, _, _ = polished(model, outcome.best.sequence, z, POLISH_ROUNDS)
+    return _plan(task, model, outcome, z, gap, start)
+
+
+def _without_plan(task: ContactTask, model: Model, search: Search, outcome: Outcome) -> tuple[Status, str]:
+    if outcome.limited:
+        return "time_limit", "the budget was spent before a plan was found"
+    if np.isfinite(outcome.bound):
+        raise SolverFailed("some contact sequences could neither be solved nor ruled out numerically")
+    return "infeasible", why_infeasible(task, model, search.phi)
+
+
+def _plan(task: ContactTask, model: Model, outcome: Outcome, z: Array, gap: float, start: float) -> Plan:
+    sequence = outcome.best.sequence
+    if sequence is None:
+        raise SolverFailed("no contact sequence to recover a plan from")
+    positions = positions_at(task, model, sequence, z)
+    forces, reactions = finger_forces(task, model, sequence, z)
+    residual = wrench_residual(task, positions, forces, reactions)
+    if not residual <= RESIDUAL:
+        raise SolverFailed(f"the best plan misses Newton-Euler by {residual:.2g} of the object's weight")
+    objective = plan_cost(task, sequence.modes, positions, forces)
+    bound = min(outcome.bound * task.weight**2, objective)
+    closed = objective - bound <= gap * abs(objective) * (1 + 1e-9)
+    return Plan(
+        status="optimal" if closed else "feasible",
+        objective=objective,
+        bound=bound,
+        seconds=time.perf_counter() - start,
+        nodes=outcome.nodes,
+        modes=sequence.modes,
+        positions=positions,
+        forces=forces,
+        contact_forces=reactions,
+        residual=residual,
+        reason="" if closed else "the budget was spent before the gap closed",
+    )

@@ -1,0 +1,217 @@
+"""Best-first search over contact modes, contact positions and free regions: the exact solver's tree.
+
+A node is a prefix of modes, bounded by its forces so far, each finger's least smoothing cost and the cost-to-go; or a
+complete mode sequence with a box of contact positions and, where needed, regions for free fingers.  The least bound in
+the heap bounds the task, so (best - bound) / best certifies the answer.
+"""
+
+import heapq
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from expert.contact.leaf import Relaxed, narrow, relax
+from expert.contact.model import Model
+from expert.contact.modes import Moves, cost_to_go, last_costs, moves_of, step_costs, window_costs
+from expert.contact.sequence import Sequence, least_smoothing, nearest_region, sequence_of
+from expert.geometry.pose import Array
+from expert.types import FREE, IntArray
+
+ROUNDS = 5
+"""Master programs per visit of a complete sequence."""
+NARROWEST = 1e-9
+"""Boxes are not split below this width of rho."""
+
+
+@dataclass(frozen=True)
+class Prefix:
+    """Modes of the first steps, one tuple per finger; joint automaton state; cost of the forces before the last step."""
+
+    modes: tuple[tuple[int, ...], ...]
+    state: int
+    forces: float
+    settled: bool = False
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """Complete modes over a box lo <= rho <= hi; assigned (T, C): region of a free finger or -1."""
+
+    sequence: Sequence
+    lo: Array
+    hi: Array
+    assigned: IntArray
+    narrowed: bool = False
+
+
+@dataclass
+class Best:
+    """The incumbent, in units of 1 (cost of the model)."""
+
+    cost: float = np.inf
+    sequence: Sequence | None = None
+    z: Array = field(default_factory=lambda: np.empty(0))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the search found; bound: no plan costs less (inf: there is none); limited: a budget was spent."""
+
+    best: Best
+    bound: float
+    nodes: int
+    limited: bool
+
+
+class Search:
+    """The tree and its tables for one task."""
+
+    def __init__(self, model: Model, fingers: int, gap: float) -> None:
+        self.model, self.fingers, self.gap = model, fingers, gap
+        self.moves: Moves = moves_of(model.facets, fingers, model.min_interval)
+        self.phi = step_costs(model, fingers)
+        self.windows = window_costs(model)
+        self.to_go = cost_to_go(self.phi, self.windows, self.moves, last_costs(model, self.phi, self.moves))
+        self.best, self.nodes = Best(), 0
+        self.heap: list[tuple[float, int, Prefix | Leaf]] = []
+        self.pushed = 0
+        self.smoothing: dict[tuple[int, ...], float] = {}
+        self.pruned = np.inf  # least bound of all that was cut off
+
+    @property
+    def cutoff(self) -> float:
+        """Bounds at or above this cannot improve the best plan by more than the gap."""
+        return self.best.cost - self.gap * abs(self.best.cost) if np.isfinite(self.best.cost) else np.inf
+
+    def run(self, *, node_limit: int | None, deadline: float) -> Outcome:
+        """Search until the gap closes, the tree is empty or a budget is spent."""
+        for s in range(len(self.moves.states)):
+            self._push_prefix((), s, 0.0, 0.0)
+        while self.heap and self.heap[0][0] < self.cutoff:
+            if time.perf_counter() > deadline or (node_limit is not None and self.nodes >= node_limit):
+                return self._outcome(limited=True)
+            bound, _, node = heapq.heappop(self.heap)
+            if isinstance(node, Prefix):
+                self._expand(bound, node)
+            else:
+                self._visit(bound, node)
+        return self._outcome(limited=False)
+
+    def _outcome(self, limited: bool) -> Outcome:
+        bound = min(self.heap[0][0] if self.heap else np.inf, self.pruned, self.best.cost)
+        return Outcome(self.best, bound, self.nodes, limited)
+
+    def _push(self, bound: float, node: Prefix | Leaf) -> None:
+        if bound >= self.cutoff:
+            self.pruned = min(self.pruned, bound)
+            return
+        self.pushed += 1
+        # ties: the deeper node first, so that plans are found early
+        heapq.heappush(self.heap, (bound, -self.pushed, node))
+
+    # prefixes of modes
+
+    def _push_prefix(
+        self, parent: tuple[tuple[int, ...], ...], state: int, forces: float, smooth: float
+    ) -> None:
+        t = len(parent[0]) if parent else 0
+        states = self.moves.states[state]
+        modes = tuple(
+            (*(parent[c] if parent else ()), (s - 1) // 3 if s else FREE) for c, s in enumerate(states)
+        )
+        if any(modes[c] > modes[c + 1] for c in range(self.fingers - 1)):
+            return  # the fingers are interchangeable
+        bound = forces + smooth + float(self.windows[t, states].sum() + self.to_go[t, state])
+        self._push(bound, Prefix(modes, state, forces))
+
+    def _expand(self, bound: float, node: Prefix) -> None:
+        """Settle the prefix's true smoothing cost; if it is still the least, branch to the next step."""
+        t = len(node.modes[0]) - 1
+        smooth = sum(self._least_smoothing(modes) for modes in node.modes)
+        settled = max(bound, node.forces + smooth + self.to_go[t, node.state])
+        if not node.settled and settled > bound * (1 + 1e-9) + 1e-12:
+            return self._push(settled, Prefix(node.modes, node.state, node.forces, settled=True))
+        self.nodes += 1
+        if t == self.model.steps - 1:
+            return self._plant(settled, node)
+        span = slice(self.moves.start[node.state], self.moves.start[node.state + 1])
+        for state, active in zip(self.moves.follow[span], self.moves.active[span], strict=True):
+            self._push_prefix(node.modes, int(state), node.forces + float(self.phi[t, active]), smooth)
+        return None
+
+    def _least_smoothing(self, modes: tuple[int, ...]) -> float:
+        if modes not in self.smoothing:
+            column = np.array(modes)[:, None]
+            self.smoothing[modes] = least_smoothing(self.model, column, np.full_like(column, -1))[0]
+        return self.smoothing[modes]
+
+    # complete sequences
+
+    def _plant(self, bound: float, node: Prefix) -> None:
+        sequence = sequence_of(self.model, np.array(node.modes).T.copy())
+        unassigned = np.full_like(sequence.modes, -1)
+        self._visit(bound, Leaf(sequence, sequence.lo, sequence.hi, unassigned))
+
+    def _visit(self, bound: float, leaf: Leaf) -> None:
+        """Bound the box; keep the best plan; split where the relaxation is loosest."""
+        self.nodes += 1
+        lo, hi = leaf.lo.copy(), leaf.hi.copy()
+        if not leaf.narrowed and not narrow(self.model, leaf.sequence, lo, hi):
+            return
+        leaf = Leaf(leaf.sequence, lo, hi, leaf.assigned, narrowed=True)
+        found = self._relax(leaf)
+        bound = max(bound, found.bound)
+        if bound >= self.cutoff:
+            self.pruned = min(self.pruned, bound)
+            return
+        if found.intrusion[2] > 0:
+            self._dive(leaf, found.last)
+        for child in self._children(bound, leaf, found):
+            self._push(bound, child)
+
+    def _relax(self, leaf: Leaf) -> Relaxed:
+        found = relax(
+            self.model, leaf.sequence, leaf.lo, leaf.hi, leaf.assigned, self.cutoff, self.gap / 2, ROUNDS
+        )
+        if found.cost < self.best.cost:
+            self.best = Best(found.cost, leaf.sequence, found.z)
+        return found
+
+    def _dive(self, leaf: Leaf, z: Array) -> None:
+        """A plan early: send every free finger that is inside the object to the region it misses least."""
+        assigned = leaf.assigned.copy()
+        for _ in range(leaf.sequence.modes.size):
+            before = assigned.copy()
+            for t, c in np.argwhere((leaf.sequence.free >= 0) & (assigned < 0)):
+                v = leaf.sequence.free[t, c]
+                region, depth = nearest_region(self.model, t, z[v], z[v + 1])
+                if depth > 0:
+                    assigned[t, c] = region
+            if (assigned == before).all():
+                return
+            found = self._relax(Leaf(leaf.sequence, leaf.lo, leaf.hi, assigned, narrowed=True))
+            if found.intrusion[2] == 0:
+                return
+            z = found.last
+
+    def _children(self, bound: float, leaf: Leaf, found: Relaxed) -> Iterator[Leaf]:
+        t, c, depth = found.intrusion
+        if depth > 0:
+            for region in range(self.model.region.shape[1]):
+                assigned = leaf.assigned.copy()
+                assigned[t, c] = region
+                yield Leaf(leaf.sequence, leaf.lo, leaf.hi, assigned, narrowed=True)
+            return
+        width = leaf.hi - leaf.lo
+        error = np.where(width > NARROWEST, np.maximum(found.chord_error, 0) + 1e-12 * width, -1)
+        if not len(width) or error.max() < 0:
+            self.pruned = min(self.pruned, bound)  # too narrow to split: it stays open
+            return
+        k = int(error.argmax())
+        at = float(np.clip(found.last[k], leaf.lo[k] + 0.2 * width[k], leaf.hi[k] - 0.2 * width[k]))
+        for lo, hi in ((leaf.lo[k], at), (at, leaf.hi[k])):
+            low, high = leaf.lo.copy(), leaf.hi.copy()
+            low[k], high[k] = lo, hi
+            yield Leaf(leaf.sequence, low, high, leaf.assigned)

@@ -1,0 +1,216 @@
+"""One mode sequence: its variables z (rho per contact interval, positions of free fingers) and its smoothing cost."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from expert.contact.model import Model
+from expert.contact.qp import SOLVED, solve_qp
+from expert.geometry.pose import Array
+from expert.types import IntArray
+
+FLAT = 1e-8
+"""Curvature, relative to the smoothing weight, that holds directions without any cost near a reference."""
+
+
+class Sequence(NamedTuple):
+    """Modes (S, C) of the first S steps, numbered variables.
+
+    interval (S, C): index of the contact interval or -1; free (S, C): first of two variables of a free position or -1 (a
+    finger that never touches is parked and has none).  facet, finger, lo, hi (K,) by interval; size: number of variables.
+    offset (S, C, 2) and map (S, C, 2, n): positions offset + map z.  Q, q, q0: smoothing cost z'Qz/2 + q'z + q0.
+    """
+
+    modes: IntArray
+    interval: IntArray
+    free: IntArray
+    facet: IntArray
+    lo: Array
+    hi: Array
+    size: int
+    offset: Array
+    map: Array
+    Q: Array
+    q: Array
+    q0: float
+    reference: Array
+
+
+@njit(cache=True)
+def sequence_of(model: Model, modes: IntArray) -> Sequence:
+    """Number the variables and add up the smoothing cost (backward second differences from the third step on)."""
+    S, C = modes.shape
+    interval, free = np.full((S, C), -1), np.full((S, C), -1)
+    facet, lo, hi = np.empty(S * C, np.int64), np.zeros(S * C), np.ones(S * C)
+    K = 0
+    for c in range(C):
+        for t in range(S):
+            f = modes[t, c]
+            if f >= 0:
+                if t == 0 or modes[t - 1, c] != f:
+                    facet[K] = f
+                    K += 1
+                interval[t, c] = K - 1
+                lo[K - 1] = max(lo[K - 1], model.low[t, f])
+                hi[K - 1] = min(hi[K - 1], model.high[t, f])
+    n = K
+    for c in range(C):
+        if np.isnan(model.parking[0]) or (modes[:, c] >= 0).any():
+            for t in range(S):
+                if modes[t, c] < 0:
+                    free[t, c] = n
+                    n += 2
+    offset, map = np.zeros((S, C, 2)), np.zeros((S, C, 2, n))
+    for t in range(S):
+        for c in range(C):
+            f = modes[t, c]
+            if f >= 0:
+                offset[t, c] = model.centre[t] + model.arm[t, f]
+                map[t, c, :, interval[t, c]] = model.edge[t, f]
+            elif free[t, c] >= 0:
+                map[t, c, 0, free[t, c]] = 1.0
+                map[t, c, 1, free[t, c] + 1] = 1.0
+            else:
+                offset[t, c] = model.parking
+    Q, q, q0 = np.zeros((n, n)), np.zeros(n), 0.0
+    row = np.zeros(n)
+    for c in range(C):
+        for t in range(2, S):
+            for d in range(2):
+                constant = offset[t, c, d] - 2 * offset[t - 1, c, d] + offset[t - 2, c, d]
+                for k in range(n):
+                    row[k] = map[t, c, d, k] - 2 * map[t - 1, c, d, k] + map[t - 2, c, d, k]
+                weight = 2 * model.acceleration_weight
+                for i in range(n):
+                    if row[i] != 0.0:
+                        q[i] += weight * row[i] * constant
+                        for j in range(n):
+                            Q[i, j] += weight * row[i] * row[j]
+                q0 += 0.5 * weight * constant * constant
+    reference = _reference(model, modes, free, lo[:K], hi[:K], n)
+    return Sequence(modes, interval, free, facet[:K], lo[:K], hi[:K], n, offset, map, Q, q, q0, reference)
+
+
+@njit(cache=True)
+def _reference(model: Model, modes: IntArray, free: IntArray, lo: Array, hi: Array, n: int) -> Array:
+    """Where flat directions are held: mid-range rho; free fingers beside the middle of the nearest facet they touch."""
+    z = np.zeros(n)
+    z[: lo.size] = 0.5 * (lo + hi)
+    S, C = modes.shape
+    for c in range(C):
+        for t in range(S):
+            if free[t, c] >= 0:
+                nearest = -1
+                for s in range(S):
+                    if modes[s, c] >= 0 and (nearest < 0 or abs(s - t) < abs(nearest - t)):
+                        nearest = s
+                f = max(modes[nearest, c], 0)
+                point = model.centre[t] + model.arm[t, f] + 0.5 * model.edge[t, f] - 0.1 * model.normal[t, f]
+                z[free[t, c]], z[free[t, c] + 1] = point[0], point[1]
+    return z
+
+
+@njit(cache=True)
+def smoothing(sequence: Sequence, z: Array) -> float:
+    """Smoothing cost at z."""
+    return 0.5 * z @ (sequence.Q @ z) + sequence.q @ z + sequence.q0
+
+
+@njit(cache=True)
+def standing_rows(
+    model: Model, sequence: Sequence, lo: Array, hi: Array, assigned: IntArray, width: int
+) -> tuple[Array, Array]:
+    """Rows A z >= b of `width` columns: rho in [lo, hi], free fingers clear of walls and in their assigned regions.
+
+    assigned (S, C): region of a free finger (Thesis 3-CT7), -1 where none is imposed yet.
+    """
+    S, C = sequence.modes.shape
+    K, W, H = lo.size, len(model.walls), model.region.shape[2]
+    loose = assigned_count = 0
+    for t in range(S):
+        for c in range(C):
+            if sequence.free[t, c] >= 0:
+                loose += 1
+                assigned_count += assigned[t, c] >= 0
+    m = 2 * K + loose * W + assigned_count * H
+    A, b = np.zeros((m, width)), np.zeros(m)
+    for k in range(K):
+        A[2 * k, k], b[2 * k] = 1.0, lo[k]
+        A[2 * k + 1, k], b[2 * k + 1] = -1.0, -hi[k]
+    i = 2 * K
+    for t in range(S):
+        for c in range(C):
+            v = sequence.free[t, c]
+            if v < 0:
+                continue
+            for w in range(W):
+                A[i, v], A[i, v + 1], b[i] = model.walls[w, 0], model.walls[w, 1], model.walls[w, 2]
+                i += 1
+            if assigned[t, c] >= 0:
+                for h in range(H):
+                    row = model.region[t, assigned[t, c], h]
+                    A[i, v], A[i, v + 1], b[i] = -row[0], -row[1], -row[2]
+                    i += 1
+    return A, b
+
+
+@njit(cache=True)
+def least_over_box(model: Model, z: Array, slope: Array, lo: Array, hi: Array) -> float:
+    """min over the box of slope.(x - z): what a convex function with this gradient at z can still fall by."""
+    fall = 0.0
+    for k in range(z.size):
+        low = lo[k] if k < lo.size else -model.workspace
+        high = hi[k] if k < lo.size else model.workspace
+        fall += min(slope[k] * (low - z[k]), slope[k] * (high - z[k]))
+    return fall
+
+
+@njit(cache=True)
+def least_smoothing(model: Model, modes: IntArray, assigned: IntArray) -> tuple[float, Array]:
+    """Lower bound of the smoothing cost of a mode sequence (0: the solver failed; inf: rho has no room), and where."""
+    s = sequence_of(model, modes)
+    if (s.lo > s.hi).any():
+        return np.inf, s.reference
+    A, b = standing_rows(model, s, s.lo, s.hi, assigned, s.size)
+    ridge = FLAT * (1 + model.acceleration_weight)
+    H = s.Q + ridge * np.eye(s.size)
+    status, z, u = solve_qp(H, s.q - ridge * s.reference, A, b, 0, model.iterations)
+    if status != SOLVED:
+        return 0.0, s.reference
+    slope = s.Q @ z + s.q
+    bound = smoothing(s, z)
+    for i in range(b.size):
+        weight = max(u[i], 0.0)
+        bound += weight * (b[i] - A[i] @ z)
+        slope -= weight * A[i]
+    return max(0.0, bound + least_over_box(model, z, slope, s.lo, s.hi)), z
+
+
+@njit(cache=True)
+def worst_intrusion(model: Model, sequence: Sequence, z: Array, assigned: IntArray) -> tuple[int, int, float]:
+    """Step, finger and depth of the free finger deepest outside all regions; depth 0: all are outside the object."""
+    worst_t, worst_c, worst = -1, -1, 1e-9
+    S, C = sequence.modes.shape
+    for t in range(S):
+        for c in range(C):
+            v = sequence.free[t, c]
+            if v >= 0 and assigned[t, c] < 0:
+                _, depth = nearest_region(model, t, z[v], z[v + 1])
+                if depth > worst:
+                    worst_t, worst_c, worst = t, c, depth
+    return worst_t, worst_c, worst if worst_t >= 0 else 0.0
+
+
+@njit(cache=True)
+def nearest_region(model: Model, t: int, x: float, y: float) -> tuple[int, float]:
+    """Region that a point misses by least, and by how much (<= 0: inside)."""
+    best, least = -1, np.inf
+    for r in range(model.region.shape[1]):
+        miss = -np.inf
+        for h in range(model.region.shape[2]):
+            row = model.region[t, r, h]
+            miss = max(miss, row[0] * x + row[1] * y - row[2])
+        if miss < least:
+            best, least = r, miss
+    return best, least

@@ -1,0 +1,224 @@
+"""One time step: least force cost with given facets active, exact wrench cones, and bounds that duality makes safe.
+
+A finger on a facet with rho in [lo, hi] exerts every wrench of the cone spanned by its friction rays at both ends, and
+no other: with w = rho lambda_n the cone is convex (Thesis 3-CT2 to 3-CT4 without an envelope).  For any multipliers y of
+the wrench balance, D(y) = y.required - max_environment - sum_c max_finger is a lower bound of the step's cost, evaluated
+in closed form; the tolerance of the program's solver therefore never enters a bound.
+"""
+
+import numpy as np
+from numba import njit
+
+from expert.contact.model import Model
+from expert.contact.qp import FAILED, INFEASIBLE, SOLVED, solve_qp
+from expert.geometry.pose import Array
+from expert.types import IntArray
+
+RIDGE = 1e-7
+"""Curvature given to reactions and to doubly described forces, in units of 1 / (m g)^2: reactions cost nothing."""
+CERTAIN = 1e-9
+"""An infeasible step must miss its required wrench by this much [m g, m g L] for multipliers of length one."""
+
+
+@njit(cache=True)
+def seen(model: Model, t: int, f: int, rho: float, y: Array) -> tuple[float, float]:
+    """Multipliers y as normal and tangential gain of a force at rho: y.wrench = z_n lambda_n + z_t lambda_t."""
+    dx = model.arm[t, f, 0] + rho * model.edge[t, f, 0]
+    dy = model.arm[t, f, 1] + rho * model.edge[t, f, 1]
+    zx, zy = y[0] - y[2] * dy, y[1] + y[2] * dx
+    n, tau = model.normal[t, f], model.tangent[t, f]
+    return zx * n[0] + zy * n[1], zx * tau[0] + zy * tau[1]
+
+
+@njit(cache=True)
+def gain(model: Model, t: int, f: int, rho: float, y: Array) -> float:
+    """h(rho) = max over the friction cone of y.wrench - |lambda|^2 + margin term.  Convex in rho."""
+    zn, zt = seen(model, t, f, rho, y)
+    mu, weight = model.friction, model.force_weight
+    zn, zt = zn + model.margin_weight * model.true_friction, max(abs(zt) - model.margin_weight, 0.0)
+    edge = (zn + mu * zt) / max(2 * weight * (1 + mu * mu), 1e-300)
+    normal = zn / max(2 * weight, 1e-300) if mu * mu * zn >= zt * mu else edge
+    normal = min(max(normal, model.min_force), model.max_force)
+    tangential = min(zt / max(2 * weight, 1e-300), mu * normal)
+    return zn * normal + zt * tangential - weight * (normal * normal + tangential * tangential)
+
+
+@njit(cache=True)
+def reach(model: Model, t: int, f: int, rho: float, y: Array) -> float:
+    """max over the friction cone of y.wrench.  Convex in rho."""
+    zn, zt = seen(model, t, f, rho, y)
+    most = zn + model.friction * abs(zt)
+    return most * (model.max_force if most > 0 else model.min_force)
+
+
+@njit(cache=True)
+def environment_reach(model: Model, t: int, y: Array) -> float:
+    """max over what walls and support can exert of y.wrench."""
+    total, group, best = 0.0, -1, 0.0
+    for e in range(model.rays.shape[1]):
+        g = model.group[t, e]
+        if g != group:
+            if group >= 0:
+                total += best * model.limit[t, group]
+            group, best = g, 0.0
+        if g < 0:
+            break
+        ray = model.rays[t, e]
+        best = max(best, ray[0] * y[0] + ray[1] * y[1] + ray[2] * y[2])
+    if group >= 0:
+        total += best * model.limit[t, group]
+    return total
+
+
+@njit(cache=True)
+def cost_bound(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, y: Array) -> float:
+    """D(y): no wrench balance with these facets costs less."""
+    bound = model.required[t] @ y - environment_reach(model, t, y)
+    for i in range(facets.size):
+        low, high = gain(model, t, facets[i], lo[i], y), gain(model, t, facets[i], hi[i], y)
+        bound -= max(low, high)
+    return bound
+
+
+@njit(cache=True)
+def shortfall(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, y: Array) -> float:
+    """Positive: no wrench balance exists with these facets, and y proves it."""
+    miss = model.required[t] @ y - environment_reach(model, t, y)
+    for i in range(facets.size):
+        miss -= max(reach(model, t, facets[i], lo[i], y), reach(model, t, facets[i], hi[i], y))
+    return miss
+
+
+@njit(cache=True)
+def step_program(
+    model: Model, t: int, facets: IntArray, lo: Array, hi: Array
+) -> tuple[Array, Array, Array, Array, Array]:
+    """H, g, A, b of the step's program over ray weights x >= 0, and the finger rays' forces (2, n).
+
+    Rays of a finger: both cone edges (and the normal if the margin is rewarded) at lo, and at hi where that differs.
+    """
+    each = 3 if model.margin_weight > 0 else 2
+    count = 0
+    for i in range(facets.size):
+        count += each if lo[i] == hi[i] else 2 * each
+    env, groups = 0, 0
+    while env < model.rays.shape[1] and model.group[t, env] >= 0:
+        groups = model.group[t, env] + 1
+        env += 1
+    n = count + env
+    limits = facets.size * (2 if model.min_force > 0 else 1)
+    m = 3 + n + limits + groups
+    H, g, A, b = np.zeros((n, n)), np.zeros(n), np.zeros((m, n)), np.zeros(m)
+    force = np.zeros((2, n))
+    k, row = 0, 3 + n
+    for i in range(facets.size):
+        f, first = facets[i], k
+        normal, tangent = model.normal[t, f], model.tangent[t, f]
+        for end in range(1 if lo[i] == hi[i] else 2):
+            rho = lo[i] if end == 0 else hi[i]
+            dx = model.arm[t, f, 0] + rho * model.edge[t, f, 0]
+            dy = model.arm[t, f, 1] + rho * model.edge[t, f, 1]
+            for j in range(each):
+                slope = (model.friction, -model.friction, 0.0)[j]
+                fx, fy = normal[0] + slope * tangent[0], normal[1] + slope * tangent[1]
+                force[0, k], force[1, k] = fx, fy
+                A[0, k], A[1, k], A[2, k] = fx, fy, dx * fy - dy * fx
+                g[k] = -model.margin_weight * (model.true_friction - abs(slope))
+                k += 1
+        for p in range(first, k):
+            for q in range(first, k):
+                H[p, q] = 2 * model.force_weight * (force[0, p] * force[0, q] + force[1, p] * force[1, q])
+        A[row, first:k], b[row] = -1.0, -model.max_force
+        row += 1
+        if model.min_force > 0:
+            A[row, first:k], b[row] = 1.0, model.min_force
+            row += 1
+    for e in range(env):
+        for d in range(3):
+            A[d, count + e] = model.rays[t, e, d]
+        A[row + model.group[t, e], count + e] = -1.0
+    for p in range(groups):
+        b[row + p] = -model.limit[t, p]
+    for k in range(n):
+        H[k, k] += RIDGE
+        A[3 + k, k] = 1.0
+    b[:3] = model.required[t]
+    return H, g, A, b, force
+
+
+@njit(cache=True)
+def solve_step(
+    model: Model, t: int, facets: IntArray, lo: Array, hi: Array
+) -> tuple[int, float, float, Array, Array]:
+    """Status, cost reached, lower bound, multipliers y (a proof where infeasible), ray weights x.
+
+    INFEASIBLE only with a proof that `shortfall` confirms; FAILED leaves the bound of y = 0 and no more.
+    """
+    H, g, A, b, _ = step_program(model, t, facets, lo, hi)
+    y = np.zeros(3)
+    if g.size == 0:
+        size = np.abs(model.required[t]).max()
+        if size <= CERTAIN:
+            return SOLVED, 0.0, 0.0, y, g
+        y[:] = model.required[t] / size
+        return INFEASIBLE, np.inf, np.inf, y, g
+    status, x, u = solve_qp(H, g, A, b, 3, model.iterations)
+    y[:] = u[:3]
+    if status == SOLVED:
+        cost = 0.5 * x @ (H @ x) - 0.5 * RIDGE * (x @ x) + g @ x
+        trivial = cost_bound(model, t, facets, lo, hi, np.zeros(3))
+        return SOLVED, cost, max(trivial, cost_bound(model, t, facets, lo, hi, y)), y, x
+    if status == INFEASIBLE:
+        length = np.sqrt(y @ y)
+        if length > 0:
+            y /= length
+            if shortfall(model, t, facets, lo, hi, y) > CERTAIN:
+                return INFEASIBLE, np.inf, np.inf, y, x
+    y[:] = 0.0
+    return FAILED, np.inf, cost_bound(model, t, facets, lo, hi, y), y, x
+
+
+@njit(cache=True)
+def tighten(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, i: int, end: int) -> bool:
+    """Move lo[i] (end 0) or hi[i] (end 1) in to the first rho that admits a wrench balance.  False: there is none.
+
+    Newton's method on certificates: multipliers that prove one rho hopeless also rule out its neighbours, exactly.
+    """
+    low, high = lo.copy(), hi.copy()
+    f = facets[i]
+    for _ in range(12):
+        rho = lo[i] if end == 0 else hi[i]
+        low[i] = high[i] = rho
+        status, _, _, y, _ = solve_step(model, t, facets, low, high)
+        if status != INFEASIBLE:
+            return True
+        others = shortfall(model, t, facets, low, high, y) + reach(model, t, f, rho, y) - CERTAIN
+        far = hi[i] if end == 0 else lo[i]
+        if reach(model, t, f, far, y) < others and reach(model, t, f, rho, y) < others:
+            return False  # convex in rho: no rho in between reaches it either
+        moved = first_reach(model, t, f, rho, far, y, others)
+        if end == 0:
+            lo[i] = moved
+        else:
+            hi[i] = moved
+        if abs(moved - rho) <= 1e-12:
+            return True
+    return True
+
+
+@njit(cache=True)
+def first_reach(model: Model, t: int, f: int, rho: float, far: float, y: Array, wanted: float) -> float:
+    """Where `reach`, convex with reach(rho) < wanted <= reach(far), attains `wanted`; never beyond that point.
+
+    The chord lies above a convex function, so each chord's root lies short of the true one.
+    """
+    start, end = rho, far
+    at_start, at_end = reach(model, t, f, start, y), reach(model, t, f, end, y)
+    for _ in range(8):
+        if at_end - at_start <= 0:
+            break
+        start += (wanted - at_start) / (at_end - at_start) * (end - start)
+        at_start = reach(model, t, f, start, y)
+        if wanted - at_start <= 1e-12:
+            break
+    return start
