@@ -40,7 +40,7 @@ class Moment:
     fingers: Array
     touching: Array
     arrows: tuple[tuple[Array, Array, str], ...]
-    """(where it acts, force [N], colour)."""
+    """(where it acts, its arrow [m], colour)."""
 
 
 def draw(task: ContactTask, plan: Plan, path: str | os.PathLike[str]) -> None:
@@ -88,8 +88,10 @@ def _moment(task: ContactTask, plan: Plan, t: int) -> Moment:
     if not plan.found:
         none = np.empty((0, 2))
         return Moment(pose=task.trajectory.poses[t], fingers=none, touching=np.empty(0), arrows=())
-    fingers = [(plan.positions[t, c], plan.forces[t, c], FINGER_FORCE) for c in range(task.fingers.count)]
-    reactions = [(c.point, c.force, REACTION) for c in plan.contact_forces if c.step == t]
+    scale = _metres_per_newton(task, plan)
+    pushes = zip(plan.positions[t], plan.forces[t], strict=True)
+    fingers = [(point, scale * force, FINGER_FORCE) for point, force in pushes]
+    reactions = [(c.point, scale * c.force, REACTION) for c in plan.contact_forces if c.step == t]
     return Moment(
         pose=task.trajectory.poses[t],
         fingers=plan.positions[t],
@@ -125,18 +127,23 @@ def _draw_moment(axes: Axes, task: ContactTask, moment: Moment) -> None:
     axes.fill(
         *to_world(moment.pose, task.body.vertices).T, facecolor=OBJECT, edgecolor=EDGE, lw=1.2, zorder=3
     )
-    for point, force, color in moment.arrows:
+    for point, arrow, color in moment.arrows:
         # Finger forces push: their arrows end at the contact; reactions begin there.
-        arrow = force * _metres_per_newton(task)
         draw_arrow(axes, point - arrow if color == FINGER_FORCE else point, arrow, color)
     for place, touches in zip(moment.fingers, moment.touching, strict=True):
         face = FINGER if touches else "white"
         axes.plot(*place, "o", ms=5.5, mfc=face, mec=FINGER, mew=1.2, zorder=6)
 
 
-def _metres_per_newton(task: ContactTask) -> float:
-    """The object's weight is drawn half as long as the object."""
-    return 0.5 * task.body.size / task.weight
+def _metres_per_newton(task: ContactTask, plan: Plan) -> float:
+    """The largest force is drawn 0.6 L long."""
+    largest = max(
+        [
+            np.linalg.norm(plan.forces, axis=-1).max(initial=0.0),
+            *(np.linalg.norm(c.force) for c in plan.contact_forces),
+        ]
+    )
+    return 0.6 * task.body.size / max(float(largest), 1e-12)
 
 
 def _view(task: ContactTask, plan: Plan) -> tuple[Array, Array]:
@@ -144,8 +151,9 @@ def _view(task: ContactTask, plan: Plan) -> tuple[Array, Array]:
     shown = [to_world(task.trajectory.poses, task.body.vertices).reshape(-1, 2)]
     if plan.found:
         shown += [plan.positions.reshape(-1, 2)]
-        shown += [(plan.positions - _metres_per_newton(task) * plan.forces).reshape(-1, 2)]
-        shown += [c.point[None] + _metres_per_newton(task) * c.force for c in plan.contact_forces]
+        scale = _metres_per_newton(task, plan)
+        shown += [(plan.positions - scale * plan.forces).reshape(-1, 2)]
+        shown += [c.point[None] + scale * c.force for c in plan.contact_forces]
     points = np.concatenate(shown)
     room = 0.15 * task.body.size
     low, high = points.min(axis=0) - room, points.max(axis=0) + room
@@ -158,4 +166,5 @@ def _title(task: ContactTask, plan: Plan) -> str:
     plane = f"{task.environment.plane} plane, {task.fingers.count} finger" + "s" * (task.fingers.count > 1)
     if not plan.found:
         return f"{plane}: {plan.status}"
-    return f"{plane}: cost {plan.objective:.4g}"
+    largest = 0.6 * task.body.size / _metres_per_newton(task, plan)
+    return f"{plane}: cost {plan.objective:.4g}; longest arrow {largest:.2g} N"

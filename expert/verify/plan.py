@@ -274,10 +274,8 @@ def _cost(task: ContactTask, plan: Plan, limits: Tolerances) -> tuple[Check, ...
     excess = (plan.bound - plan.objective) / scale
     unproved = np.inf if plan.status == "optimal" and not np.isfinite(plan.bound) else 0.0
     return (
-        Check.largest(
-            "objective", [abs(plan.objective - true) / scale], limits.objective, "objective", ("plan",)
-        ),
-        Check.largest("bound", [max(excess, unproved)], limits.objective, "objective", ("plan",)),
+        Check.largest("objective", abs(plan.objective - true) / scale, limits.objective, "objective", ()),
+        Check.largest("bound", max(excess, unproved), limits.objective, "objective", ()),
     )
 
 
