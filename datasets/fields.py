@@ -1,11 +1,7 @@
-"""The fields of a stored sample: names, types, axes, and the way from a Sample to arrays and back.
-
-Axes: n sample, t step, y and x pixel, k colour, v vertex (padded with zeros to the data set's largest polygon), c finger,
-e contact with the floor, d coordinate, p pose (x, y, theta), j end point or ray, h region row, b bound.
-"""
+"""The fields of a stored sample: names, types, axes, and the way from a Sample to arrays and back."""
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -22,49 +18,83 @@ NO_VERTEX = -1
 PARAMETER = "parameter_"
 """Prefix of the fields that hold P(t); see MechanicalParameters for their meaning."""
 
-PARAMETER_AXES = {
-    "poses": "ntp",
-    "wrench": "ntp",
-    "facets": "ntcjd",
-    "cones": "ntcjd",
-    "contact": "ntc",
-    "stick": "ntc",
-    "force_limits": "ntcb",
-    "region_normals": "ntchd",
-    "region_offsets": "ntch",
-    "external_points": "nted",
-    "external_cones": "ntejd",
-    "reference_positions": "ntcd",
-    "reference_forces": "ntcd",
+
+@dataclass(frozen=True)
+class Field:
+    """kind: numpy's letter for the type.  axes: one letter each, as in AXES.  meaning: with its unit."""
+
+    kind: str
+    axes: str
+    meaning: str
+
+
+AXES = {
+    "n": "sample",
+    "t": "step",
+    "y": "pixel row",
+    "x": "pixel column",
+    "k": "red, green, blue",
+    "v": "vertex",
+    "c": "finger",
+    "e": "floor contact",
+    "d": "x, y",
+    "p": "x, y, theta",
+    "w": "force x, force y, torque",
+    "j": "end point or ray",
+    "h": "half-plane",
+    "b": "least, largest",
 }
 
-FIELDS: dict[str, tuple[str, str]] = {
-    "index": ("i", "n"),
-    "attempt": ("i", "n"),
-    "family": ("U", "n"),
-    "video": ("u", "ntyxk"),
-    "poses": ("f", "ntp"),
-    "dt": ("f", "n"),
-    "vertices": ("f", "nvd"),
-    "vertex_count": ("i", "n"),
-    "mass": ("f", "n"),
-    "inertia": ("f", "n"),
-    "friction": ("f", "n"),
-    "min_normal_force": ("f", "n"),
-    "positions": ("f", "ntcd"),
-    "forces": ("f", "ntcd"),
-    "modes": ("i", "ntc"),
-    "floor_vertices": ("i", "nte"),
-    "floor_points": ("f", "nted"),
-    "floor_forces": ("f", "nted"),
-    "status": ("U", "n"),
-    "objective": ("f", "n"),
-    "bound": ("f", "n"),
-    "nodes": ("i", "n"),
-    "residual": ("f", "n"),
-    **{PARAMETER + name: ("f", axes) for name, axes in PARAMETER_AXES.items()},
+PARAMETERS = {
+    "poses": Field("f", "ntp", "motion r(t) of the centre of mass [m, m, rad]"),
+    "wrench": Field("f", "ntw", "M r_ddot + G, what all contacts together exert [N, N, N m]"),
+    "facets": Field("f", "ntcjd", "segment open to the finger [m]"),
+    "cones": Field("f", "ntcjd", "edges of its friction cone, unit normal component"),
+    "contact": Field("f", "ntc", "1 where the finger touches"),
+    "stick": Field("f", "ntc", "1 where it stays at its place to the next step, and so may push"),
+    "force_limits": Field("f", "ntcb", "normal force of a pushing finger [N]"),
+    "region_normals": Field("f", "ntchd", "half-planes A p <= b that a free finger keeps to: A"),
+    "region_offsets": Field("f", "ntch", "and b [m]"),
+    "external_points": Field("f", "nted", "floor contacts [m]"),
+    "external_cones": Field(
+        "f", "ntejd", "rays of their forces, unit normal component; zero where there are none"
+    ),
+    "reference_positions": Field("f", "ntcd", "where the torque is linearised: positions [m]"),
+    "reference_forces": Field("f", "ntcd", "and forces [N]"),
 }
-"""Kind of numpy type, and one letter per axis."""
+"""P(t) (Thesis 4-CT4); MechanicalParameters says more."""
+
+FIELDS = {
+    "index": Field("i", "n", "number of the task"),
+    "attempt": Field("i", "n", "draws that failed before it"),
+    "family": Field("U", "n", "slide, pivot, lift, lift_rotate, slide_lift or pivot_lift"),
+    "video": Field("u", "ntyxk", "frames, 0 to 255"),
+    "poses": Field("f", "ntp", "desired motion of the centre of mass [m, m, rad], at rest before and after"),
+    "dt": Field("f", "n", "time between steps [s]"),
+    "vertices": Field("f", "nvd", "polygon, body frame, counter-clockwise, padded with zeros [m]"),
+    "vertex_count": Field("i", "n", "how many of them count"),
+    "mass": Field("f", "n", "[kg]"),
+    "inertia": Field("f", "n", "about the centre of mass [kg m^2]"),
+    "friction": Field("f", "n", "coefficient, fingers and floor"),
+    "min_normal_force": Field(
+        "f", "n", "least push that the plan was asked to keep [N]; 0 where it could not"
+    ),
+    "positions": Field("f", "ntcd", "fingers of the expert's plan, world frame [m]"),
+    "forces": Field("f", "ntcd", "their forces on the object, world frame [N]"),
+    "modes": Field("i", "ntc", "facet that each finger touches, -1: none"),
+    "floor_vertices": Field("i", "nte", "vertices that the floor pushes, -1: no contact"),
+    "floor_points": Field("f", "nted", "where it pushes [m]"),
+    "floor_forces": Field("f", "nted", "its forces [N]"),
+    "status": Field("U", "n", "optimal (gap certified) or feasible (node limit reached)"),
+    "objective": Field("f", "n", "cost of the plan: sum |force|^2 + sum |acceleration|^2, SI"),
+    "bound": Field("f", "n", "certified lower bound on the cost of any plan"),
+    "nodes": Field("i", "n", "nodes of the search"),
+    "residual": Field("f", "n", "largest Newton-Euler residual over m g and m g L"),
+    **{
+        PARAMETER + name: Field(field.kind, field.axes, f"P(t): {field.meaning}")
+        for name, field in PARAMETERS.items()
+    },
+}
 
 
 def arrays_of(samples: list[Sample], most_vertices: int) -> dict[str, np.ndarray[Any, Any]]:

@@ -15,6 +15,7 @@ def main(cfg: DictConfig) -> None:
     """Make one data set and say where it is."""
     specification = instantiate(cfg.dataset, _convert_="object")
     out = Path(cfg.out or f"data/{specification.name}-seed{cfg.seed}")
+    now = versions()
     manifest = generate(
         Generation(
             specification=specification,
@@ -29,7 +30,7 @@ def main(cfg: DictConfig) -> None:
         ", ".join(f"{count} {reason}" for reason, count in manifest["failures"].items()) or "none failed"
     )
     print(f"{out}: {manifest['tasks']} tasks of {manifest['draws']} draws ({failures})")
-    if manifest["versions"] != versions():
+    if manifest["versions"] != now:
         print("made by other versions of the code; overwrite=true makes it anew", file=sys.stderr)
     if refuted := manifest["failures"].get("unsound", 0):
         print(

@@ -20,6 +20,7 @@ from threadpoolctl import threadpool_limits
 
 import datasets
 import expert
+from datasets.card import card
 from datasets.motions import FAMILIES
 from datasets.specification import Specification, draw
 from datasets.store import (
@@ -108,6 +109,7 @@ def generate(job: Generation) -> Manifest:
     _make(job, missing, request["fingerprint"])
     manifest = _summary(job, request)
     _remove_leftovers(job)
+    write_whole(job.out / "README.md", card(manifest).encode())
     write_manifest(job.out, manifest)
     return manifest
 

@@ -29,6 +29,10 @@ BETWEEN = 4
 """Points per step at which a motion is held against the floor."""
 
 
+class NoRoom(InvalidProblem):
+    """A shape has no motion of the wanted family."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Phase:
     """Rotation by `angle` [rad] about `pivot` (world frame; None: the centre of mass) together with a translation [m]."""
@@ -148,10 +152,10 @@ def sample_motion(
 ) -> Trajectory:
     """Motion of `family` from rest on a random stable side; its swept width is centred within `spread` [m] of x = 0.
 
-    Raises InvalidProblem for an unknown family, or a body that no motion of the family suits.
+    Raises InvalidProblem for an unknown family, NoRoom for a body that no motion of the family suits.
     """
     require(family in FAMILIES, "family", "one of " + ", ".join(FAMILIES), family)
-    require(steps >= 5 and steps % 2 == 1, "steps", "an odd number >= 5, so that two phases share it", steps)
+    _check_steps(steps, "steps")
     angles = stable_angles(body.vertices, np.zeros(2))
     for _ in range(ATTEMPTS if len(angles) else 0):
         rest = Rest.of(body, float(rng.choice(angles)))
@@ -163,9 +167,13 @@ def sample_motion(
             poses = poses_of(rest.pose, phases, steps)
             poses[:, 0] += rng.uniform(-spread, spread) - (swept[..., 0].min() + swept[..., 0].max()) / 2
             return Trajectory.of(poses, dt, "rest")
-    raise InvalidProblem(
+    raise NoRoom(
         "object", expected=f"a shape with room for the motion {family}", got=f"none in {ATTEMPTS} draws"
     )
+
+
+def _check_steps(steps: int, field: str) -> None:
+    require(steps >= 5 and steps % 2 == 1, field, "an odd number >= 5, so that two phases share it", steps)
 
 
 def _clears_floor(swept: Array, last: Phase) -> bool:
@@ -202,35 +210,43 @@ class Tasks:
 
     def __post_init__(self) -> None:
         require(0 < self.mass < np.inf, "tasks.mass", "a positive number of kilograms", self.mass)
-        require(0 < self.gravity < np.inf, "tasks.gravity", "a positive number", self.gravity)
-        require(
-            0 <= self.least_push < self.force_limit,
-            "tasks.least_push",
-            "less than force_limit",
-            self.least_push,
-        )
+        require(0 < self.dt < np.inf, "tasks.dt", "a positive number of seconds", self.dt)
+        _check_steps(self.steps, "tasks.steps")
+        self.environment(), self.point_fingers(), self.robustness()  # each checks its own part
 
     def task(self, body: Body, trajectory: Trajectory) -> ContactTask:
         """The task of moving `body` along `trajectory` over the floor y = 0."""
-        weight = self.mass * self.gravity
-        floor = HalfPlane(point=np.zeros(2), normal=np.array([0.0, 1.0]), friction=self.friction)
         return ContactTask(
             body=body,
-            environment=Environment(gravity=self.gravity, walls=(floor,)),
+            environment=self.environment(),
             trajectory=trajectory,
-            fingers=Fingers(
-                count=self.fingers,
-                friction=self.friction,
-                max_force=self.force_limit * weight,
-                facet_margin=self.facet_margin,
-                clearance=self.clearance,
-            ),
-            robustness=Robustness(
-                cone_fraction=self.cone_fraction,
-                support_inset=self.support_inset,
-                min_normal_force=self.least_push * weight,
-                min_interval=self.min_interval,
-            ),
+            fingers=self.point_fingers(),
+            robustness=self.robustness(),
+        )
+
+    def environment(self) -> Environment:
+        """Gravity, and the floor."""
+        up = np.array([0.0, 1.0])
+        floor = HalfPlane(point=np.zeros(2), normal=up, friction=self.friction, name="tasks.floor")
+        return Environment(gravity=self.gravity, walls=(floor,))
+
+    def point_fingers(self) -> Fingers:
+        """Number, friction and limits."""
+        return Fingers(
+            count=self.fingers,
+            friction=self.friction,
+            max_force=self.force_limit * self.mass * self.gravity,
+            facet_margin=self.facet_margin,
+            clearance=self.clearance,
+        )
+
+    def robustness(self) -> Robustness:
+        """Margins that let plans survive their execution."""
+        return Robustness(
+            cone_fraction=self.cone_fraction,
+            support_inset=self.support_inset,
+            min_normal_force=self.least_push * self.mass * self.gravity,
+            min_interval=self.min_interval,
         )
 
 

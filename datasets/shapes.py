@@ -8,7 +8,7 @@ import shapely
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import crossing_edges, diameter, facets, mass_properties, signed_area
 from expert.geometry.pose import Array, cross, rotation
-from expert.types import require
+from expert.types import readonly, require
 
 ATTEMPTS = 10_000
 STABLE_SHARE = 0.15
@@ -33,9 +33,9 @@ class Shapes:
     slightest_turn: float = 0.1
 
     def __post_init__(self) -> None:
-        few, many = self.facets
+        few, many = (int(n) for n in readonly(self.facets, (2,), "shapes.facets"))
         require(3 <= few <= many <= 64, "shapes.facets", "3 <= least <= greatest <= 64", list(self.facets))
-        small, large = self.diameter
+        small, large = (float(d) for d in readonly(self.diameter, (2,), "shapes.diameter"))
         require(0 < small <= large < np.inf, "shapes.diameter", "0 < least <= greatest", list(self.diameter))
         require(
             0 <= self.shortest_facet < 1, "shapes.shortest_facet", "a share in [0, 1)", self.shortest_facet

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from datasets.label import Labelling, Refusal, label
-from datasets.motions import FAMILIES, Tasks, sample_task
+from datasets.motions import FAMILIES, NoRoom, Tasks, sample_task
 from datasets.parameters import MechanicalParameters, parameters_of
 from datasets.render import Camera, Frames, Palette, render
 from datasets.shapes import Shapes
@@ -126,7 +126,7 @@ def _attempt(
 ) -> tuple[ContactTask, Plan, MechanicalParameters] | Refusal:
     try:
         task = sample_task(rng, family, specification.shapes, specification.tasks)
-    except InvalidProblem as unsuitable:
+    except NoRoom as unsuitable:
         return Refusal(reason="no_motion", detail=str(unsuitable))
     answer = label(task, specification.labelling)
     if isinstance(answer, Refusal):

@@ -94,7 +94,7 @@ def decode_shard(data: bytes, source: str) -> tuple[dict[str, Any], Arrays]:
 def _check_arrays(arrays: Arrays, source: str) -> None:
     """Every field there, of its type and shape, and finite; the first field tells the number of samples and steps."""
     sizes: dict[str, int] = {}
-    for name, (kind, axes) in FIELDS.items():
+    for name, field in FIELDS.items():
         array = arrays.get(name)
         if array is None:
             raise InvalidProblem(f"{source} {name}", expected="a field of this name", got="none")
@@ -103,12 +103,14 @@ def _check_arrays(arrays: Arrays, source: str) -> None:
             raise InvalidProblem(
                 f"{source} {name}", expected="finite numbers", got=f"{array[where]} at {where}"
             )
-        fits = array.dtype.kind == kind and array.ndim == len(axes)
-        if not fits or any(sizes.setdefault(axis, n) != n for axis, n in zip(axes, array.shape, strict=True)):
-            wanted = ", ".join(str(sizes.get(axis, axis)) for axis in axes)
+        fits = array.dtype.kind == field.kind and array.ndim == len(field.axes)
+        if not fits or any(
+            sizes.setdefault(axis, n) != n for axis, n in zip(field.axes, array.shape, strict=True)
+        ):
+            wanted = ", ".join(str(sizes.get(axis, axis)) for axis in field.axes)
             raise InvalidProblem(
                 f"{source} {name}",
-                expected=f"type {KINDS[kind]}, shape ({wanted})",
+                expected=f"type {KINDS[field.kind]}, shape ({wanted})",
                 got=f"{array.dtype}, {array.shape}",
             )
 

@@ -49,7 +49,7 @@ def task_of(dataset: TaskDataset, i: int) -> ContactTask:
 
 
 def _tensor(name: str, array: np.ndarray, folder: Path) -> Tensor:
-    if FIELDS[name][0] != "U":
+    if FIELDS[name].kind != "U":
         return torch.from_numpy(np.ascontiguousarray(array))
     words = tuple(FAMILIES) if name == "family" else STATUSES
     if unknown := sorted(set(array.tolist()) - set(words)):

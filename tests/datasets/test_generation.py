@@ -1,0 +1,212 @@
+"""The same data whatever happens on the way: number of processes, kills, damaged files."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from datasets.generation import Generation, generate
+from datasets.label import Labelling, Refusal, label
+from datasets.motions import FAMILIES, Tasks, sample_task
+from datasets.shapes import Shapes
+from datasets.specification import FailedDraw, Specification, draw, generator
+from datasets.store import encode_shard, read_dataset, read_manifest, shard_path
+from expert.errors import InvalidProblem, SolverFailed
+from expert.verify.plan import check_plan
+
+Contents = Callable[[Path], dict[str, bytes]]
+
+COMMAND = [sys.executable, "-m", "datasets.generate", "dataset=smoke", "dataset.count=6", "dataset.shard=2"]
+
+
+def test_two_processes_make_the_bytes_of_one(
+    small: Specification, made: Path, tmp_path: Path, contents: Contents
+) -> None:
+    generate(Generation(specification=small, seed=0, out=tmp_path / "two", jobs=2))
+    assert contents(tmp_path / "two") == contents(made)
+
+
+@pytest.mark.slow
+def test_a_job_killed_twice_ends_with_the_bytes_of_an_undisturbed_one(
+    made: Path, tmp_path: Path, contents: Contents
+) -> None:
+    out = tmp_path / "killed"
+    for wanted in (1, 2):  # kill as soon as so many shards are there
+        job = subprocess.Popen([*COMMAND, f"out={out}", "jobs=2"], start_new_session=True)
+        while job.poll() is None and len(list(out.glob("shards/*.npz"))) < wanted:
+            time.sleep(0.002)
+        os.killpg(job.pid, signal.SIGKILL)
+        assert job.wait() == -signal.SIGKILL, "finished before it could be killed"
+        assert not read_manifest(out)["complete"]
+    subprocess.run([*COMMAND, f"out={out}", "jobs=2"], check=True)
+    assert contents(out) == contents(made)
+
+
+@pytest.mark.slow
+def test_ctrl_c_stops_cleanly_and_says_how_to_go_on(tmp_path: Path) -> None:
+    out = tmp_path / "interrupted"
+    many = [*COMMAND, "dataset.count=200", "dataset.shard=1", f"out={out}", "jobs=2"]
+    job = subprocess.Popen(
+        many, start_new_session=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    while job.poll() is None and not list(out.glob("shards/*.npz")):
+        time.sleep(0.01)
+    os.killpg(job.pid, signal.SIGINT)
+    stdout, stderr = job.communicate(timeout=60)
+    assert job.returncode == 130
+    assert stdout == ""
+    assert len(stderr.splitlines()) == 1
+    assert f"of 200 shards in {out}; the same command goes on from there" in stderr
+    assert not list(out.rglob(".*"))  # no drafts
+
+
+def _cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+def _flip(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(bytes(data))
+
+
+@pytest.mark.parametrize("damage", [Path.unlink, _cut, _flip, lambda p: p.write_bytes(b"")])
+def test_an_unfinished_data_set_is_mended_shard_by_shard(
+    damage: Callable[[Path], None], small: Specification, made: Path, tmp_path: Path, contents: Contents
+) -> None:
+    folder = tmp_path / "damaged"
+    shutil.copytree(made, folder)
+    manifest = read_manifest(folder)
+    (folder / "manifest.json").write_text(
+        json.dumps(
+            {
+                k: manifest[k]
+                for k in ("schema", "kind", "name", "seed", "settings", "versions", "fingerprint")
+            }
+            | {"complete": False}
+        )
+    )
+    damage(shard_path(folder, 1))
+    (folder / "shards" / ".00001.npz.123").write_bytes(b"draft of a killed run")
+    untouched = shard_path(folder, 0).stat().st_mtime_ns
+    generate(Generation(specification=small, seed=0, out=folder, jobs=1))
+    assert contents(folder) == contents(made)
+    assert shard_path(folder, 0).stat().st_mtime_ns == untouched
+
+
+def test_a_complete_data_set_is_left_alone(small: Specification, made: Path) -> None:
+    before = {p: p.stat().st_mtime_ns for p in made.rglob("*")}
+    assert generate(Generation(specification=small, seed=0, out=made)) == read_manifest(made)
+    assert {p: p.stat().st_mtime_ns for p in made.rglob("*")} == before
+
+
+def test_other_settings_or_seed_are_refused_by_name_and_destroy_nothing(
+    small: Specification, made: Path, contents: Contents
+) -> None:
+    before = contents(made)
+    other = replace(small, labelling=replace(small.labelling, node_limit=7))
+    with pytest.raises(
+        InvalidProblem, match=r"^out: .*of other seed, labelling.node_limit; .*overwrite=true"
+    ):
+        generate(Generation(specification=other, seed=1, out=made))
+    assert contents(made) == before
+
+
+def test_overwriting_replaces_all_shards(
+    small: Specification, made: Path, tmp_path: Path, contents: Contents
+) -> None:
+    folder = tmp_path / "old"
+    shutil.copytree(made, folder)
+    fewer = replace(small, count=2)
+    generate(Generation(specification=fewer, seed=1, out=folder, jobs=1, overwrite=True))
+    fresh = tmp_path / "fresh"
+    generate(Generation(specification=fewer, seed=1, out=fresh, jobs=1))
+    assert contents(folder) == contents(fresh)
+    assert contents(folder)["shards/00000.npz"] != contents(made)["shards/00000.npz"]
+
+
+def test_an_unfinished_data_set_of_other_code_is_refused(
+    small: Specification, made: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "old"
+    folder.mkdir()
+    manifest = read_manifest(made)
+    manifest |= {"complete": False, "versions": manifest["versions"] | {"code": "0" * 16}}
+    (folder / "manifest.json").write_text(json.dumps(manifest))
+    with pytest.raises(InvalidProblem, match=r"^out: .*of the installed versions, got .* of other code;"):
+        generate(Generation(specification=small, seed=0, out=folder))
+
+
+def test_families_come_in_equal_parts_and_every_label_is_sound_again_when_read_back(made: Path) -> None:
+    data = read_dataset(made)
+    samples = [data[i] for i in range(len(data))]
+    assert [s.family for s in samples] == list(FAMILIES)
+    for sample in samples:
+        assert check_plan(sample.task, sample.plan).verdict == "sound"
+
+
+def test_data_sets_of_one_seed_share_no_task(smoke: Specification) -> None:
+    first, second = (generator(name, 0, 0, 0).random(4) for name in ("train", "finetune"))
+    assert not np.allclose(first, second)
+    (a, _), (b, _) = (draw(replace(smoke, name=name), 0, 0) for name in ("train", "finetune"))
+    assert not np.array_equal(a.video, b.video)
+
+
+def test_failed_draws_are_counted_by_reason(smoke: Specification, tmp_path: Path) -> None:
+    """Weak fingers on a slippery floor: many lifts have no plan, and the manifest says how many and which."""
+    weak = replace(smoke, count=3, shard=3, tasks=replace(smoke.tasks, friction=0.15, force_limit=2.0))
+    manifest = generate(Generation(specification=weak, seed=0, out=tmp_path / "weak", jobs=1))
+    failed = manifest["failed_draws"]
+    assert manifest["failures"].get("infeasible", 0) > 0
+    assert manifest["draws"] == manifest["tasks"] + len(failed) == 3 + sum(manifest["failures"].values())
+    assert "unsound" not in manifest["failures"]
+    data = read_dataset(tmp_path / "weak")
+    for i in range(3):
+        assert data[i].attempt == sum(f["index"] == i for f in failed)
+    again, failures = draw(weak, 0, failed[0]["index"])
+    assert [vars(f) for f in failures] == [f for f in failed if f["index"] == again.index]
+
+
+def test_a_task_that_no_draw_can_label_stops_the_job(smoke: Specification) -> None:
+    hopeless = replace(smoke, tasks=replace(smoke.tasks, friction=0.01, least_push=0.0))
+    with pytest.raises(SolverFailed, match=r"^task 2 \(lift\): no label in 100 draws; the last: infeasible"):
+        draw(hopeless, 0, 2)
+
+
+def test_a_spent_budget_is_no_proof_of_infeasibility() -> None:
+    task = sample_task(np.random.default_rng(0), "slide_lift", Shapes(facets=(12, 12)), Tasks(least_push=0.0))
+    answer = label(task, Labelling(node_limit=1, gap=1e-9))
+    reason = answer.reason if isinstance(answer, Refusal) else answer.plan.status
+    assert reason in ("budget", "feasible")
+
+
+def test_every_data_set_has_its_stated_size(configured: Callable[[str], Specification]) -> None:
+    sizes = {
+        name: (s.count, s.shapes.facets)
+        for name in ("train", "finetune", "test", "family", "smoke")
+        for s in [configured(name)]
+    }
+    assert sizes == {
+        "train": (20, (4, 6)),
+        "finetune": (20, (4, 6)),
+        "test": (40, (12, 12)),
+        "family": (40, (4, 6)),
+        "smoke": (4, (4, 6)),
+    }
+
+
+def test_shards_hold_no_clock(small: Specification, made: Path) -> None:
+    data = read_dataset(made)
+    failed = [FailedDraw(index=0, attempt=0, family="slide", reason="infeasible", detail="x")]
+    first = encode_shard([data[0]], failed, small, "f")
+    time.sleep(2.1)  # zip entries tell time in steps of two seconds
+    assert encode_shard([data[0]], failed, small, "f") == first
