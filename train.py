@@ -6,7 +6,7 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
 from datasets.entry import entry_point
-from dlm.checkpoint import load, restore_model
+from dlm.checkpoint import load, restore_weights
 from dlm.evaluation.watch import watch
 from dlm.models import Policy
 from dlm.tasks import TaskBatch, read_all
@@ -50,7 +50,7 @@ def start_from(cfg: DictConfig, earlier: str, policy: Policy, model: str) -> Non
     """Load the weights of an earlier stage."""
     path = folder(cfg) / f"{earlier}.safetensors"
     command = f"python train.py stage={earlier} model={model} seed={cfg.seed} output={cfg.output}"
-    restore_model(policy, load(path, command=command), name=model, source=path)
+    restore_weights(policy.weights(), load(path, command=command), name=model, source=path)
 
 
 def folder(cfg: DictConfig) -> Path:
@@ -60,11 +60,9 @@ def folder(cfg: DictConfig) -> Path:
 
 def settings(cfg: DictConfig, stage: Stage) -> dict[str, object]:
     """All that a stage's steps depend on, as plain values; enough to rebuild the policy."""
-    chosen = {key: cfg[key] for key in ("model", "solver", "schedule", "seed")}
-    plain = OmegaConf.to_container(
-        OmegaConf.create({**chosen, "stage": cfg.stages[stage.name]}), resolve=True
-    )
-    return {str(key): value for key, value in plain.items()}
+    plain = OmegaConf.to_container(cfg, resolve=True)
+    chosen = {key: plain[key] for key in ("model", "solver", "schedule", "seed")}
+    return {**chosen, "stage": plain["stages"][stage.name]}
 
 
 if __name__ == "__main__":

@@ -128,8 +128,10 @@ def restore_optimiser(optimiser: torch.optim.Optimizer, tensors: Mapping[str, Te
     optimiser.load_state_dict({"state": state, "param_groups": optimiser.state_dict()["param_groups"]})
 
 
-def restore_model(model: torch.nn.Module, checkpoint: Checkpoint, *, name: str, source: Path) -> None:
-    """Load weights into a model called `name`.  Raises InvalidProblem for the checkpoint of another model."""
+def restore_weights(
+    weights: Mapping[str, Tensor], checkpoint: Checkpoint, *, name: str, source: Path
+) -> None:
+    """Overwrite the weights of a model called `name`.  Raises InvalidProblem for the checkpoint of another model."""
     if checkpoint.about.model != name:
         raise InvalidProblem(
             f"checkpoint {source}",
@@ -137,14 +139,15 @@ def restore_model(model: torch.nn.Module, checkpoint: Checkpoint, *, name: str, 
             got=f"weights of model {checkpoint.about.model}",
             remedy="choose the model that was trained, or another output folder",
         )
-    wanted = {key: tuple(value.shape) for key, value in model.state_dict().items()}
-    found = {key: tuple(value.shape) for key, value in checkpoint.model.items()}
-    if odd := sorted(set(wanted.items()) ^ set(found.items())):
-        key = odd[0][0]
-        raise InvalidProblem(
-            f"checkpoint {source}",
-            expected=f"{key} of shape {wanted.get(key, 'none')}",
-            got=f"shape {found.get(key, 'none')}",
-            remedy="it was trained with other settings; train again",
-        )
-    model.load_state_dict(checkpoint.model)
+    for key in sorted({*weights, *checkpoint.model}):
+        wanted, found = (tuple(w[key].shape) if key in w else None for w in (weights, checkpoint.model))
+        if wanted != found:
+            raise InvalidProblem(
+                f"checkpoint {source}",
+                expected=f"{key} of shape {wanted}",
+                got=f"shape {found}",
+                remedy="it was trained with other settings; train again",
+            )
+    with torch.no_grad():
+        for key, value in weights.items():
+            value.copy_(checkpoint.model[key])

@@ -30,6 +30,10 @@ class Policy(nn.Module):
         """Let the untrained network answer with the average task of a training set."""
         self.derenderer.fit_centre(tasks.parameters)
 
+    def weights(self) -> dict[str, Tensor]:
+        """What was learned, and what it was scaled by; the constants of a program are neither."""
+        return {name: value for name, value in self.state_dict().items() if not name.startswith("program.")}
+
     def __call__(self, video: Tensor) -> Action:
         return super().__call__(video)
 

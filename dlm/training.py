@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from torch.utils.tensorboard import SummaryWriter
 
-from dlm.checkpoint import About, Checkpoint, load, optimiser_tensors, restore_model, restore_optimiser
+from dlm.checkpoint import About, Checkpoint, load, optimiser_tensors, restore_optimiser, restore_weights
 from dlm.losses import Loss
 from dlm.models import Kind, Policy, seeded
 from dlm.tasks import TaskBatch
@@ -100,14 +100,14 @@ class Training:
         )
         return Checkpoint(
             about=about,
-            model=self.policy.state_dict(),
+            model=self.policy.weights(),
             optimiser=optimiser_tensors(self.optimiser),
             random=torch.get_rng_state(),
         )
 
     def restore(self, saved: Checkpoint, *, path: Path, model: str) -> None:
         """Go back to a saved state."""
-        restore_model(self.policy, saved, name=model, source=path)
+        restore_weights(self.policy.weights(), saved, name=model, source=path)
         restore_optimiser(self.optimiser, saved.optimiser)
         torch.set_rng_state(saved.random)
         self.iteration, self.history = saved.about.iteration, list(saved.about.history)

@@ -1,0 +1,46 @@
+"""Training curves (Fig. 4-6): finger- and object-trajectory losses over the iterations of every stage."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from dlm.training import Row
+
+COLOURS = {"nn": "tab:red", "nnm": "tab:orange", "mdr": "tab:blue", "cvx": "tab:green", "dlm": "tab:purple"}
+LINES = {"train": "-", "finetune": "-", "test": "--", "family": ":"}
+
+PANELS = (
+    ("Finger-trajectory loss", "finger", ("nn", "mdr", "cvx"), ("train", "test")),
+    ("Object-trajectory loss", "object", ("nn", "mdr", "cvx"), ("train", "test", "family")),
+    ("Object-trajectory loss, fine-tuning", "object", ("nnm", "dlm"), ("finetune", "test", "family")),
+)
+
+Histories = Mapping[str, Sequence[Sequence[Row]]]
+"""Logged rows by stage, one list per seed."""
+
+
+def curves_figure(histories: Histories, no_action: float) -> Figure:
+    """Three panels as in the thesis; lines are means over seeds.  no_action: object loss of doing nothing [cm^2]."""
+    figure = Figure(figsize=(13, 4), layout="constrained")
+    for ax, (title, kind, stages, datasets) in zip(figure.subplots(1, 3), PANELS, strict=True):
+        for stage in stages:
+            for dataset in datasets:
+                _line(ax, histories.get(stage, []), f"{kind}/{dataset}", COLOURS[stage], stage, dataset)
+        if kind == "object":
+            ax.axhline(no_action, color="0.6", lw=1, label="no action, test")
+        ax.set(title=title, xlabel="iteration", ylabel="cm²", yscale="log")
+        ax.legend(fontsize=7, ncols=2)
+    return figure
+
+
+def _line(ax: Axes, seeds: Sequence[Sequence[Row]], key: str, colour: str, stage: str, dataset: str) -> None:
+    if not seeds or not seeds[0]:
+        return
+    iterations = [row["iteration"] for row in seeds[0]]
+    values = np.array([[row[key] for row in rows] for rows in seeds])
+    label = f"{stage.upper()}, {dataset}"
+    ax.plot(iterations, values.mean(0), LINES[dataset], color=colour, lw=1.4, label=label)
+    if len(values) > 1:
+        ax.fill_between(iterations, values.min(0), values.max(0), color=colour, alpha=0.12, lw=0)

@@ -1,0 +1,171 @@
+"""Table 4.1: object-trajectory loss and times of every architecture, between doing nothing and the oracle."""
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from dlm.evaluation.outcomes import Outcome
+
+DATASETS = {"train": "train", "finetune": "fine-tune", "test": "test", "family": "family"}
+"""Columns and their headings."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cell:
+    """One architecture on one data set; means over tasks, then over seeds; spread: standard deviation over seeds.
+
+    loss [cm^2], median [cm^2], ratio to no action, RMS distance [mm] and angle [deg], share of tasks within 2 mm and 2 deg;
+    tasks in which the object was dropped and tasks whose program was not solved, as `seed number: task number`.
+    """
+
+    tasks: int
+    loss: float
+    spread: float
+    median: float
+    ratio: float
+    finger_loss: float
+    rms_mm: float
+    rms_deg: float
+    within: float
+    dropped: list[list[int]]
+    unsolved: list[list[int]]
+
+    @classmethod
+    def of(cls, outcomes: Sequence[Outcome], idle: Outcome) -> "Cell":
+        """Of one architecture's outcomes, one per seed."""
+        losses = [o.object_loss.mean() for o in outcomes]
+        rms_mm, rms_deg = np.mean([o.rms for o in outcomes], axis=0)
+        return cls(
+            tasks=len(idle.poses),
+            loss=float(np.mean(losses)),
+            spread=float(np.std(losses, ddof=1)) if len(losses) > 1 else 0.0,
+            median=float(np.median([o.object_loss for o in outcomes])),
+            ratio=float(np.mean(losses) / idle.object_loss.mean()),
+            finger_loss=float(np.mean([o.finger_loss.mean() for o in outcomes])),
+            rms_mm=float(rms_mm),
+            rms_deg=float(rms_deg),
+            within=float(np.mean([o.success.mean() for o in outcomes])),
+            dropped=[np.flatnonzero(o.dropped).tolist() for o in outcomes],
+            unsolved=[np.flatnonzero(~o.solved).tolist() for o in outcomes],
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """One row: its cells by data set, and seconds per task where they mean something."""
+
+    model: str
+    cells: dict[str, Cell]
+    forward: float | None = None
+    backward: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """All rows, and how they came about: command, seeds, versions, machine."""
+
+    lines: list[Line]
+    origin: dict[str, object]
+
+    def as_json(self) -> dict[str, object]:
+        """Plain values."""
+        return asdict(self)
+
+    def as_csv(self) -> str:
+        """One record per architecture and data set."""
+        out = io.StringIO()
+        lists = ("dropped", "unsolved")
+        names = [n for n in Cell.__dataclass_fields__ if n not in lists]
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow(["model", "dataset", *names, *lists, "forward_s", "backward_s"])
+        for line in self.lines:
+            for dataset, cell in line.cells.items():
+                numbers = [getattr(cell, n) for n in names]
+                counts = [sum(map(len, getattr(cell, n))) for n in lists]
+                writer.writerow([line.model, dataset, *numbers, *counts, line.forward, line.backward])
+        return out.getvalue()
+
+    def as_markdown(self) -> str:
+        """The table of the thesis, then what its one number hides."""
+        sections = [
+            "# Table 4.1",
+            "Object-trajectory loss [cm²] (mean over tasks and seeds ± standard deviation over seeds) and seconds per task.",
+            _grid(*self.main()),
+            *(f"{title}\n\n{_grid(*self.detail(kind))}" for kind, title in DETAILS.items()),
+            "Dropped objects, by task (data set: tasks of the first seed, …)\n\n" + self._drops(),
+            "How it came about\n\n" + "\n".join(f"* {k}: {v}" for k, v in self.origin.items()),
+        ]
+        return "\n\n".join(sections) + "\n"
+
+    def main(self) -> tuple[list[str], list[list[str]]]:
+        """Heading and rows of the table of the thesis."""
+        head = ["model", *(DATASETS[d] for d in self._datasets), "forward s", "backward s"]
+        rows = [
+            [x.model, *(_loss(c) for c in x.cells.values()), _seconds(x.forward), _seconds(x.backward)]
+            for x in self.lines
+        ]
+        return head, rows
+
+    def detail(self, kind: str) -> tuple[list[str], list[list[str]]]:
+        """Heading and rows of one of DETAILS."""
+        rows = [[x.model, *(_detail(c, kind) for c in x.cells.values())] for x in self.lines]
+        return ["model", *(DATASETS[d] for d in self._datasets)], rows
+
+    @property
+    def _datasets(self) -> list[str]:
+        return list(self.lines[0].cells)
+
+    def _drops(self) -> str:
+        lines = []
+        for x in self.lines:
+            parts = [
+                f"{DATASETS[d]} {' | '.join(' '.join(map(str, seed)) or '–' for seed in c.dropped)}"
+                for d, c in x.cells.items()
+            ]
+            lines.append(f"* {x.model}: " + "; ".join(parts))
+        return "\n".join(lines)
+
+
+DETAILS = {
+    "ratio": "Loss / loss of no action",
+    "median": "Median loss [cm²]",
+    "within": "Share of tasks that end within 2 mm and 2°",
+    "rms": "RMS error over the motion [mm, °]",
+    "finger": "Finger-trajectory loss [cm²], against the expert's positions",
+    "drops": "Dropped objects per seed (programs not solved)",
+}
+
+
+def _loss(cell: Cell) -> str:
+    seeds = len(cell.dropped)
+    return _number(cell.loss) + (f" ± {_number(cell.spread)}" if seeds > 1 else "")
+
+
+def _detail(cell: Cell, kind: str) -> str:
+    seeds = len(cell.dropped)
+    drops, unsolved = (sum(map(len, lists)) / seeds for lists in (cell.dropped, cell.unsolved))
+    return {
+        "ratio": _number(cell.ratio),
+        "median": _number(cell.median),
+        "within": f"{cell.within:.3f}",
+        "rms": f"{cell.rms_mm:.2f}, {cell.rms_deg:.2f}",
+        "finger": _number(cell.finger_loss),
+        "drops": f"{drops:g} of {cell.tasks} ({unsolved:g})",
+    }[kind]
+
+
+def _number(value: float) -> str:
+    """Three digits where it matters, never a misleading 0.000."""
+    return f"{value:.3f}" if value >= 1e-3 or value == 0 else f"{value:.1e}"
+
+
+def _seconds(value: float | None) -> str:
+    return "–" if value is None else f"{value:.4f}"
+
+
+def _grid(head: list[str], rows: list[list[str]]) -> str:
+    lines = ["| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *rows]]
+    return "\n".join(lines)

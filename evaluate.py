@@ -1,0 +1,83 @@
+"""Compare the trained architectures: `python evaluate.py output=runs seeds=[0]` writes Table 4.1, curves and a report."""
+
+import json
+import shlex
+import sys
+from pathlib import Path
+
+from hydra.utils import instantiate
+from omegaconf import DictConfig
+from rich.console import Console
+
+from datasets.entry import entry_point
+from datasets.store import write_whole
+from dlm.checkpoint import About, load, restore_weights
+from dlm.evaluation.study import Study, Trained
+from dlm.models import Policy
+from dlm.tasks import read_all
+from dlm.training import Stage
+from expert.types import require
+
+STAGES = ("nn", "nnm", "mdr", "cvx", "dlm")
+
+
+@entry_point("evaluate")
+def main(cfg: DictConfig) -> None:
+    """Rebuild every policy from its checkpoint, execute its actions, write tables and report."""
+    require(len(cfg.seeds) > 0, "seeds", "at least one seed", list(cfg.seeds), "seeds=[0]")
+    tasks = read_all(cfg.data)
+    study = Study(
+        trained=[trained(cfg, name) for name in STAGES],
+        tasks=tasks,
+        simulator=instantiate(cfg.simulator, _convert_="object"),
+    )
+    with Console(stderr=True).status("simulating") as status:
+        outcomes = study.outcomes()
+        status.update("timing")
+        table = study.table(outcomes, origin(cfg, {name: batch.fingerprint for name, batch in tasks.items()}))
+        status.update("drawing")
+        page = study.report(outcomes, table, cfg.examples)
+    folder = Path(cfg.output)
+    files = {
+        "table_4_1.md": table.as_markdown(),
+        "table_4_1.csv": table.as_csv(),
+        "table_4_1.json": json.dumps(table.as_json(), indent=1),
+        "report.html": page,
+    }
+    for name, text in files.items():
+        write_whole(folder / name, text.encode())
+    print(table.as_markdown())
+    print(f"report: {(folder / 'report.html').resolve()}")
+
+
+def trained(cfg: DictConfig, name: str) -> Trained:
+    """One architecture with the policies of all seeds."""
+    loaded = [load_policy(Path(cfg.output), name, seed) for seed in cfg.seeds]
+    return Trained(
+        stage=loaded[0][0], policies=[policy for _, policy, _ in loaded], abouts=[a for *_, a in loaded]
+    )
+
+
+def load_policy(output: Path, name: str, seed: int) -> tuple[Stage, Policy, About]:
+    """A policy as its checkpoint describes it, with its weights."""
+    path = output / f"seed_{seed}" / f"{name}.safetensors"
+    saved = load(path, command=f"python train.py stage={name} seed={seed} output={output}")
+    about = saved.about
+    require(
+        about.stage == name, f"checkpoint {path}", f"stage {name}", f"stage {about.stage}", "train it again"
+    )
+    stage = instantiate(about.settings["stage"], _convert_="object")
+    model = instantiate(about.settings["model"], _convert_="object")
+    policy = model.build(stage.policy, instantiate(about.settings["solver"]), seed=seed)
+    restore_weights(policy.weights(), saved, name=model.name, source=path)
+    return stage, policy, about
+
+
+def origin(cfg: DictConfig, data: dict[str, str]) -> dict[str, object]:
+    """How the numbers came about."""
+    command = shlex.join(["python", Path(sys.argv[0]).name, *sys.argv[1:]])
+    return {"command": command, "seeds": list(cfg.seeds), "data (sha256)": data}
+
+
+if __name__ == "__main__":
+    main()
