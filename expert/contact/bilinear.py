@@ -1,0 +1,242 @@
+"""The exact model in SCIP: rho is one number per contact interval, and torque enters as w = rho lambda_n (spatial branching).
+
+Slow and independent of the other methods: it exists to cross-check them on small tasks.
+"""
+
+import time
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pyscipopt
+from pyscipopt import quicksum
+
+from expert.contact.recovery import Found, modes_of, plan_of
+from expert.contact.scaled import ScaledTask
+from expert.errors import SolverFailed
+from expert.geometry.pose import Array, cross
+from expert.mip.backends import scip_answer
+from expert.types import FREE, ContactTask, Plan, Status
+
+TOLERANCE = 1e-9
+"""Absolute feasibility tolerance asked of SCIP, in m g and m g L."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """SCIP's model and its variables: touch, rho, normal, tangential, w by (t, c, f); region by (t, c, r);
+    p by (t, c, d); reaction by (i,)."""
+
+    scip: pyscipopt.Model
+    touch: dict
+    rho: dict
+    normal: dict
+    tangential: dict
+    w: dict
+    region: dict
+    p: dict
+    reaction: list
+
+
+def solve(task: ContactTask, *, gap: float = 1e-3, time_limit: float = 60.0) -> Plan:
+    """Globally optimal plan of the exact problem, to SCIP's tolerance.
+
+    Raises SolverFailed where SCIP failed numerically, KeyboardInterrupt when interrupted.
+    """
+    start = time.perf_counter()
+    s = ScaledTask.of(task)
+    m = build(task, s)
+    m.scip.setParams({"limits/gap": gap, "limits/time": time_limit, "numerics/feastol": TOLERANCE})
+    m.scip.optimize()
+    answer = scip_answer(m.scip, [])
+    if answer.status == "failed":
+        raise SolverFailed(f"bilinear model: SCIP gave no answer ({answer.message})")
+    spent: dict[str, Any] = {"bound": answer.bound * s.weight**2, "nodes": answer.nodes}
+    spent["seconds"] = time.perf_counter() - start
+    if answer.x is None:
+        reason = "the exact bilinear model has no solution" if answer.status == "infeasible" else ""
+        status: Status = "infeasible" if answer.status == "infeasible" else "time_limit"
+        return Plan(status=status, reason=reason, **spent)
+    status = "optimal" if answer.status == "optimal" else "feasible"
+    return plan_of(task, s, _found(m, task, s), status=status, reason="", **spent)
+
+
+def build(task: ContactTask, s: ScaledTask) -> Model:
+    """All constraints and the cost, one group after the other."""
+    m = _variables(task, s)
+    _contact(m, task, s)
+    _sequence(m, task, s)
+    _places(m, task, s)
+    _dynamics(m, task, s)
+    _cost(m, task, s)
+    return m
+
+
+def _indices(task: ContactTask, s: ScaledTask) -> tuple[range, range, range, range]:
+    T, F, R = s.shape
+    return range(T), range(task.fingers.count), range(F), range(R)
+
+
+def _variables(task: ContactTask, s: ScaledTask) -> Model:
+    scip = pyscipopt.Model()
+    scip.hideOutput()
+    steps, fingers, facets, regions = _indices(task, s)
+    friction = task.fingers.friction * task.robustness.cone_fraction
+    low, high = s.workspace
+
+    def grid(name: str, *axes: range, **options: Any) -> dict:
+        return {i: scip.addVar(name=f"{name}{list(i)}", **options) for i in product(*axes)}
+
+    touching = (steps, fingers, facets)
+    limits = s.reaction_rows.T @ s.reaction_limits
+    return Model(
+        scip=scip,
+        touch=grid("touch", *touching, vtype="B"),
+        rho=grid("rho", *touching, lb=0.0, ub=1.0),
+        normal=grid("normal", *touching, lb=0.0, ub=s.max_force),
+        tangential=grid("tangential", *touching, lb=-friction * s.max_force, ub=friction * s.max_force),
+        w=grid("w", *touching, lb=0.0, ub=s.max_force),
+        region=grid("region", steps, fingers, regions, vtype="B"),
+        p={(t, c, d): scip.addVar(lb=low[d], ub=high[d]) for t, c, d in product(steps, fingers, range(2))},
+        reaction=[scip.addVar(lb=0.0, ub=limit) for limit in limits],
+    )
+
+
+def _contact(m: Model, task: ContactTask, s: ScaledTask) -> None:
+    """Force within its cone while the finger stays; w = rho lambda_n; rho within the margins."""
+    add, margin = m.scip.addCons, task.fingers.facet_margin
+    friction = task.fingers.friction * task.robustness.cone_fraction
+    last = len(s.centres) - 1
+    for (t, c, f), touch in m.touch.items():
+        normal, tangential, rho = m.normal[t, c, f], m.tangential[t, c, f], m.rho[t, c, f]
+        stays = [touch] if t == last else [touch, m.touch[t + 1, c, f]]
+        for one in stays:
+            add(normal <= s.max_force * one)
+        if s.min_force:
+            add(normal >= s.min_force * (quicksum(stays) - len(stays) + 1))
+        add(tangential <= friction * normal)
+        add(tangential >= -friction * normal)
+        add(rho >= margin)
+        add(rho <= 1 - margin)
+        add(m.w[t, c, f] == rho * normal)
+
+
+def _sequence(m: Model, task: ContactTask, s: ScaledTask) -> None:
+    """One facet or one region; free before another facet; one rho per contact interval; contacts that last."""
+    add = m.scip.addCons
+    steps, fingers, facets, regions = _indices(task, s)
+    for t, c in product(steps, fingers):
+        add(quicksum(m.touch[t, c, f] for f in facets) + quicksum(m.region[t, c, r] for r in regions) == 1)
+    for t, c, f in product(steps[:-1], fingers, facets):
+        now, later = m.touch[t, c, f], m.touch[t + 1, c, f]
+        for g in facets:
+            if g != f:
+                add(now + m.touch[t + 1, c, g] <= 1)
+        difference = m.rho[t + 1, c, f] - m.rho[t, c, f]
+        add(difference <= 2 - now - later)
+        add(difference >= now + later - 2)
+    if task.robustness.min_interval == 2:
+        for (t, c, f), touch in m.touch.items():
+            add(touch <= quicksum(m.touch[u, c, f] for u in (t - 1, t + 1) if u in steps))
+
+
+def _places(m: Model, task: ContactTask, s: ScaledTask) -> None:
+    """Fingers on their facets, or in their regions; all of them clear of walls.  Big-M from the workspace box."""
+    add = m.scip.addCons
+    low, high = s.workspace
+    margin = task.fingers.facet_margin
+    for (t, c, f), touch in m.touch.items():
+        (ax, ay), (bx, by) = s.levers[t, f] + s.centres[t]
+        for d, (a, b) in enumerate(((ax, bx), (ay, by))):
+            ends = (a + margin * (b - a), b - margin * (b - a))
+            offset = m.p[t, c, d] - a - m.rho[t, c, f] * (b - a)
+            add(offset <= (high[d] - min(ends)) * (1 - touch))
+            add(offset >= (low[d] - max(ends)) * (1 - touch))
+    for (t, c, r), inside in m.region.items():
+        for normal, b in zip(s.region_A[t, r], s.region_b[t, r], strict=True):
+            farthest = float(np.maximum(normal * low, normal * high).sum())
+            if normal.any():
+                add(
+                    normal[0] * m.p[t, c, 0] + normal[1] * m.p[t, c, 1]
+                    <= b + max(farthest - b, 0.0) * (1 - inside)
+                )
+    for t, c in product(*_indices(task, s)[:2]):
+        for normal, b in zip(s.wall_A, s.wall_b, strict=True):
+            add(normal[0] * m.p[t, c, 0] + normal[1] * m.p[t, c, 1] <= b)
+
+
+def _dynamics(m: Model, task: ContactTask, s: ScaledTask) -> None:
+    """Newton and Euler at every step: force lambda_n n + lambda_t tau, torque (a - q) x lambda + l w."""
+    steps, fingers, facets, _ = _indices(task, s)
+    n, tau = task.body.frames_w(task.trajectory.poses)
+    length = np.linalg.norm(s.levers[..., 1, :] - s.levers[..., 0, :], axis=-1)
+    for t in steps:
+        for row in range(3):
+            terms = [s.reactions[t, row, i] * x for i, x in enumerate(m.reaction) if s.reactions[t, row, i]]
+            for c, f in product(fingers, facets):
+                gain_n, gain_t = (
+                    _wrench(s.levers[t, f, 0], direction)[row] for direction in (n[t, f], tau[t, f])
+                )
+                terms += [gain_n * m.normal[t, c, f], gain_t * m.tangential[t, c, f]]
+                terms += [length[t, f] * m.w[t, c, f]] if row == 2 else []
+            m.scip.addCons(quicksum(terms) == s.required[t, row])
+    for row, limit in zip(s.reaction_rows, s.reaction_limits, strict=True):
+        if row.any():
+            m.scip.addCons(quicksum(m.reaction[i] for i in np.flatnonzero(row)) <= limit)
+
+
+def _wrench(arm: Array, force: Array) -> Array:
+    return np.array([*force, float(cross(arm, force))])
+
+
+def _cost(m: Model, task: ContactTask, s: ScaledTask) -> None:
+    """sum |lambda|^2 + |p_ddot|^2 - beta, one epigraph variable per square."""
+    terms = []
+
+    def charge(weight: float, expression: Any) -> None:
+        square = m.scip.addVar(lb=0.0)
+        m.scip.addCons(weight * expression * expression <= square)
+        terms.append(square)
+
+    if s.force_cost:
+        for component in (*m.normal.values(), *m.tangential.values()):
+            charge(s.force_cost, component)
+    if s.acceleration_cost:
+        for t, c, d in m.p:
+            if t >= 2:
+                charge(s.acceleration_cost, m.p[t, c, d] - 2 * m.p[t - 1, c, d] + m.p[t - 2, c, d])
+    if s.margin_cost:
+        mu = task.fingers.friction
+        for i in m.normal:
+            beta = m.scip.addVar(lb=0.0)
+            for side in (1, -1):
+                m.scip.addCons(np.hypot(1, mu) * beta <= mu * m.normal[i] + side * m.tangential[i])
+            terms.append(-s.margin_cost * beta)
+    m.scip.setObjective(quicksum(terms))
+
+
+def _found(m: Model, task: ContactTask, s: ScaledTask) -> Found:
+    """Values of the best point; cone weights alpha from the force's components."""
+    best = m.scip.getBestSol()
+    shape = (s.shape[0], task.fingers.count)
+
+    def values(grid: dict, last: int) -> Array:
+        return np.array([best[v] for v in grid.values()]).reshape(*shape, last)
+
+    facets = s.shape[1]
+    modes = modes_of(values(m.touch, facets))
+    facet = np.maximum(modes, 0)[..., None]
+    rho, normal, tangential = (
+        np.take_along_axis(values(grid, facets), facet, axis=2)[..., 0]
+        for grid in (m.rho, m.normal, m.tangential)
+    )
+    friction = task.fingers.friction * task.robustness.cone_fraction
+    alpha = np.stack([normal + tangential / friction, normal - tangential / friction], axis=2) / 2
+    return Found(
+        modes=modes,
+        rho=np.where(modes == FREE, 0.0, rho),
+        alpha=alpha,
+        free=values(m.p, 2),
+        reactions=np.array([best[v] for v in m.reaction]),
+    )
