@@ -111,7 +111,7 @@ class QPWeights:
             slack=slack,
             out=100 * acceleration,
             hold=acceleration,
-            anchor=1e-4 * acceleration,
+            anchor=1e-2 * acceleration,
             ridge=1e-6 * cost.force,
             filler=1.0,
         )
