@@ -22,28 +22,44 @@ from expert.contact.sequence import (
     standing_rows,
     worst_intrusion,
 )
-from expert.contact.steps import CERTAIN, environment_reach, gain, reach, solve_step, tighten
+from expert.contact.steps import CERTAIN, environment_reach, gain, reach, shortfall, solve_step, tighten
 from expert.geometry.pose import Array
 from expert.types import IntArray
 
 THETA_RIDGE = 1e-8
 """Curvature of the variables that stand for the steps' costs; the bound is recomputed without it."""
+WORTH = 0.3
+"""Share of the gap that a new cut must promise to close; below, the chords are too coarse and the box is split."""
 
 
 class Relaxed(NamedTuple):
-    """Lower bound over the box (inf: proved empty); best plan (cost inf: none) at z; where to branch.
+    """Lower bound over the box (inf: proved empty) and its share from forces; best plan (cost inf: none) at z.
 
     intrusion: step, finger, depth of the free finger deepest inside the object at the last master solution, `last`.
-    chord_error (K,): how far the chords miss, by interval.  program solved `count` times.
+    chord_error (K,): how far the chords miss there, by interval.
     """
 
     bound: float
+    forces: float
     cost: float
     z: Array
     last: Array
     intrusion: tuple[int, int, float]
     chord_error: Array
-    count: int
+
+
+class Master(NamedTuple):
+    """Minimise smoothing(z) + sum of theta_t subject to rows A (z, theta) >= b; room for more rows.
+
+    step: which theta a row bounds, -1 for none.  filled (1,): rows in use.
+    """
+
+    H: Array
+    g: Array
+    A: Array
+    b: Array
+    step: IntArray
+    filled: IntArray
 
 
 @njit(cache=True)
@@ -66,14 +82,11 @@ def narrow(model: Model, sequence: Sequence, lo: Array, hi: Array) -> bool:
         before = (hi - lo).sum()
         for t in range(len(sequence.modes)):
             on = pushes(sequence, t)
-            if on.size == 0:
-                continue
             low, high = lo[on], hi[on]
             for i in range(on.size):
                 for end in range(2):
                     if low[i] < high[i] and not tighten(model, t, sequence.facet[on], low, high, i, end):
                         return False
-            for i in range(on.size):
                 lo[on[i]], hi[on[i]] = low[i], high[i]
                 if low[i] > high[i]:
                     return False
@@ -89,22 +102,58 @@ def support(model: Model, t: int, f: int, rho: float, y: Array, proof: bool) -> 
 
 
 @njit(cache=True)
-def cut_row(
-    model: Model, sequence: Sequence, t: int, lo: Array, hi: Array, y: Array, proof: bool, row: Array
-) -> float:
-    """Fill `row` over rho with chords; returns the right side of (theta_t +) row.rho >= side.
+def open_master(
+    model: Model, sequence: Sequence, lo: Array, hi: Array, assigned: IntArray, rounds: int
+) -> Master:
+    """The program without cuts."""
+    T, n = len(sequence.modes), sequence.size
+    rows, side = standing_rows(model, sequence, lo, hi, assigned, n + T)
+    most = side.size + T * (rounds + 1)
+    A, b, step = np.zeros((most, n + T)), np.zeros(most), np.full(most, -1)
+    A[: side.size], b[: side.size] = rows, side
+    H, g = np.zeros((n + T, n + T)), np.ones(n + T)
+    ridge = FLAT * (1 + model.acceleration_weight)
+    H[:n, :n] = sequence.Q
+    g[:n] = sequence.q - ridge * sequence.reference
+    for i in range(n + T):
+        H[i, i] += ridge if i < n else THETA_RIDGE
+    return Master(H, g, A, b, step, np.array([side.size]))
 
-    proof: y shows that some rho admits no balance, and the cut says so: sum_c reach_c(rho) >= what is missing.
+
+@njit(cache=True)
+def add_cut(
+    model: Model,
+    sequence: Sequence,
+    master: Master,
+    t: int,
+    lo: Array,
+    hi: Array,
+    y: Array,
+    proof: bool,
+    at: Array,
+    error: Array,
+) -> None:
+    """theta_t >= D(y) with chords for h; or, with a proof y that some rho admits no balance, what rules it out.
+
+    Adds to `error`, by interval, how far the chords miss at `at`.
     """
-    row[:] = 0.0
+    row = master.A[master.filled[0]]
     side = model.required[t] @ y - environment_reach(model, t, y)
     for k in pushes(sequence, t):
-        f = sequence.facet[k]
+        f, width = sequence.facet[k], hi[k] - lo[k]
         low, high = support(model, t, f, lo[k], y, proof), support(model, t, f, hi[k], y, proof)
-        slope = (high - low) / (hi[k] - lo[k]) if hi[k] > lo[k] else 0.0
-        row[k] += slope
-        side -= max(low, high) if slope == 0.0 else low - slope * lo[k]
-    return side - CERTAIN if proof else side
+        if width > 0:
+            slope = (high - low) / width
+            row[k] += slope
+            side -= low - slope * lo[k]
+            error[k] += low + slope * (at[k] - lo[k]) - support(model, t, f, at[k], y, proof)
+        else:
+            side -= max(low, high)
+    master.b[master.filled[0]] = side - CERTAIN if proof else side
+    if not proof:
+        row[sequence.size + t] = 1.0
+        master.step[master.filled[0]] = t
+    master.filled[0] += 1
 
 
 @njit(cache=True)
@@ -118,131 +167,99 @@ def relax(
     gap: float,
     rounds: int,
 ) -> Relaxed:
-    """Alternate master program and exact evaluation; stop once the gap closes or the bound exceeds `target`."""
-    T, C = sequence.modes.shape
-    n, K = sequence.size, lo.size
-    width = n + T
-    base_A, base_b = standing_rows(model, sequence, lo, hi, assigned, width)
-    most = base_b.size + T * (rounds + 1)
-    A, b, theta = np.zeros((most, width)), np.zeros(most), np.full(most, -1)
-    A[: base_b.size], b[: base_b.size] = base_A, base_b
-    m, count = base_b.size, 0
-    H, g = np.zeros((width, width)), np.zeros(width)
-    ridge = FLAT * (1 + model.acceleration_weight)
-    H[:n, :n] = sequence.Q
-    for i in range(n):
-        H[i, i] += ridge
-    g[:n] = sequence.q - ridge * sequence.reference
-    for t in range(T):
-        H[n + t, n + t] = THETA_RIDGE
-        g[n + t] = 1.0
-    last_y, proofs = np.zeros((T, 3)), np.zeros(T, np.bool_)
-    best, z, bound = np.inf, sequence.reference, -np.inf
-    error, nowhere = np.zeros(K), (-1, -1, 0.0)
+    """Alternate master program and exact evaluation until the gap closes, the bound exceeds `target` or chords dominate."""
+    T, n = len(sequence.modes), sequence.size
+    master = open_master(model, sequence, lo, hi, assigned, rounds)
+    z, last = sequence.reference, sequence.reference
+    best, bound, forces = np.inf, -np.inf, 0.0
+    intrusion, error = (-1, -1, 0.0), np.zeros(lo.size)
     for t in range(T):
         on = pushes(sequence, t)
         status, _, value, y, _ = solve_step(model, t, sequence.facet[on], lo[on], hi[on])
-        count += 1
         if status == INFEASIBLE:
-            return Relaxed(np.inf, np.inf, z, z, nowhere, error, count)
-        b[m] = cut_row(model, sequence, t, lo, hi, y, False, A[m, :K])
-        A[m, n + t], theta[m] = 1.0, t
-        m += 1
-        last_y[t] = y
-    last, intrusion = z, nowhere
+            return Relaxed(np.inf, np.inf, np.inf, z, z, intrusion, error)
+        forces += value
+        add_cut(model, sequence, master, t, lo, hi, y, False, lo, error)
     for _ in range(rounds):
-        status, x, u = solve_qp(H, g, A[:m], b[:m], 0, model.iterations)
-        count += 1
-        if status == INFEASIBLE:
-            if empty(model, A[:m], b[:m], u, theta, lo, hi, n):
-                return Relaxed(np.inf, best, z, last, nowhere, error, count)
-            break
+        m = master.filled[0]
+        A, b = master.A[:m], master.b[:m]
+        status, x, u = solve_qp(master.H, master.g, A, b, 0, model.iterations)
+        if status == INFEASIBLE and empty(model, master, u, lo, hi, n):
+            return Relaxed(np.inf, forces, best, z, last, intrusion, error)
         if status != SOLVED:
             break
         last = x[:n].copy()
-        for k in range(K):
-            last[k] = min(max(last[k], lo[k]), hi[k])
-        before = bound
-        bound = max(bound, safe_bound(model, sequence, last, A[:m], b[:m], u, theta, lo, hi, T))
+        last[: lo.size] = np.minimum(np.maximum(last[: lo.size], lo), hi)
+        bound = max(bound, safe_bound(model, sequence, master, last, u, lo, hi))
         intrusion = worst_intrusion(model, sequence, last, assigned)
         if bound >= target:
             break
-        total, feasible = smoothing(sequence, last), True
-        for t in range(T):
-            on = pushes(sequence, t)
-            rho = last[on]
-            status, cost, value, y, _ = solve_step(model, t, sequence.facet[on], rho, rho)
-            count += 1
-            total += cost
-            proofs[t] = status == INFEASIBLE
-            feasible &= status == SOLVED
-            b[m] = cut_row(model, sequence, t, lo, hi, y, proofs[t], A[m, :K])
-            if not proofs[t]:
-                A[m, n + t], theta[m] = 1.0, t
-            last_y[t] = y
-            m += 1
-        if feasible and intrusion[2] == 0.0 and total < best:
-            best, z = total, last
-        if feasible and total - bound <= gap * abs(total):
+        error[:] = 0.0
+        cost, missing = evaluate(model, sequence, master, last, lo, hi, error)
+        if cost < best and intrusion[2] == 0.0:
+            best, z = cost, last
+        open_gap = missing if missing > 0 else cost - bound
+        if open_gap <= gap * abs(cost) or open_gap - error.sum() <= WORTH * open_gap:
             break
-        if (
-            bound - before < 0.2 * (min(best, total) - bound)
-            and before > -np.inf
-            and min(best, total) < np.inf
-        ):
-            break
-    for t in range(T):
-        for k in pushes(sequence, t):
-            f, width_k = sequence.facet[k], hi[k] - lo[k]
-            if width_k > 0:
-                s = (last[k] - lo[k]) / width_k
-                low = support(model, t, f, lo[k], last_y[t], proofs[t])
-                high = support(model, t, f, hi[k], last_y[t], proofs[t])
-                here = support(model, t, f, last[k], last_y[t], proofs[t])
-                error[k] += (1 - s) * low + s * high - here
-    return Relaxed(bound, best, z, last, intrusion, error, count)
+    return Relaxed(bound, forces, best, z, last, intrusion, error)
+
+
+@njit(cache=True)
+def evaluate(
+    model: Model, sequence: Sequence, master: Master, z: Array, lo: Array, hi: Array, error: Array
+) -> tuple[float, float]:
+    """Exact cost at z (inf: some step has no balance, which misses by the second value), adding each step's cut.
+
+    error: how far the chords miss, over the steps without balance if there are any.
+    """
+    cost, missing, scratch = smoothing(sequence, z), 0.0, np.zeros(lo.size)
+    for t in range(len(sequence.modes)):
+        on = pushes(sequence, t)
+        rho = z[on]
+        status, value, _, y, _ = solve_step(model, t, sequence.facet[on], rho, rho)
+        cost += value
+        proof = status == INFEASIBLE
+        if proof:
+            if missing == 0.0:
+                error[:] = 0.0
+            missing += shortfall(model, t, sequence.facet[on], rho, rho, y)
+        add_cut(
+            model, sequence, master, t, lo, hi, y, proof, z, error if proof or missing == 0.0 else scratch
+        )
+    return cost, missing
 
 
 @njit(cache=True)
 def safe_bound(
-    model: Model,
-    sequence: Sequence,
-    z: Array,
-    A: Array,
-    b: Array,
-    u: Array,
-    theta: IntArray,
-    lo: Array,
-    hi: Array,
-    T: int,
+    model: Model, sequence: Sequence, master: Master, z: Array, u: Array, lo: Array, hi: Array
 ) -> float:
     """Weak duality at any multipliers: no plan in the box costs less, whatever the solver's tolerance."""
-    n = z.size
-    total = np.zeros(T)
-    for i in range(b.size):
-        if theta[i] >= 0:
-            total[theta[i]] += max(u[i], 0.0)
+    n, total = z.size, np.zeros(len(sequence.modes))
+    for i in range(u.size):
+        if master.step[i] >= 0:
+            total[master.step[i]] += max(u[i], 0.0)
+    if total.min() <= 0.0:
+        return -np.inf
     slope = sequence.Q @ z + sequence.q
     bound = smoothing(sequence, z)
-    for i in range(b.size):
-        weight = max(u[i], 0.0)
-        if theta[i] >= 0:  # the multipliers of a step's cuts must add up to one
-            if total[theta[i]] <= 0.0:
-                return -np.inf
-            weight /= total[theta[i]]
-        if weight > 0.0:
-            bound += weight * (b[i] - A[i, :n] @ z)
-            slope -= weight * A[i, :n]
+    for i in range(u.size):
+        if u[i] > 0.0:
+            # the multipliers of a step's cuts must add up to one
+            weight = u[i] / total[master.step[i]] if master.step[i] >= 0 else u[i]
+            side = master.b[i]
+            for j in range(n):
+                side -= master.A[i, j] * z[j]
+                slope[j] -= weight * master.A[i, j]
+            bound += weight * side
     return bound + least_over_box(model, z, slope, lo, hi)
 
 
 @njit(cache=True)
-def empty(model: Model, A: Array, b: Array, u: Array, theta: IntArray, lo: Array, hi: Array, n: int) -> bool:
-    """Whether multipliers prove that no z in the box satisfies the rows without a step's cost."""
+def empty(model: Model, master: Master, u: Array, lo: Array, hi: Array, n: int) -> bool:
+    """Whether multipliers prove that no z in the box satisfies the rows that bound no theta."""
     row, side = np.zeros(n), 0.0
-    for i in range(b.size):
-        if theta[i] < 0 and u[i] > 0:
-            row -= u[i] * A[i, :n]
-            side += u[i] * b[i]
-    zero = np.zeros(n)
-    return side + least_over_box(model, zero, row, lo, hi) > 1e-9 * (1 + u.max())
+    for i in range(u.size):
+        if master.step[i] < 0 and u[i] > 0:
+            row -= u[i] * master.A[i, :n]
+            side += u[i] * master.b[i]
+    return side + least_over_box(model, np.zeros(n), row, lo, hi) > 1e-9 * (1 + u.max())

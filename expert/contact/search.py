@@ -19,7 +19,7 @@ from expert.contact.sequence import Sequence, least_smoothing, nearest_region, s
 from expert.geometry.pose import Array
 from expert.types import FREE, IntArray
 
-ROUNDS = 5
+ROUNDS = 25
 """Master programs per visit of a complete sequence."""
 NARROWEST = 1e-9
 """Boxes are not split below this width of rho."""
@@ -87,8 +87,9 @@ class Search:
 
     def run(self, *, node_limit: int | None, deadline: float) -> Outcome:
         """Search until the gap closes, the tree is empty or a budget is spent."""
-        for s in range(len(self.moves.states)):
-            self._push_prefix((), s, 0.0, 0.0)
+        states = self.moves.states
+        for s in np.flatnonzero(((states == 0) | (states % 3 == 1)).all(axis=1)):  # free, or just arrived
+            self._push_prefix((), int(s), 0.0, 0.0)
         while self.heap and self.heap[0][0] < self.cutoff:
             if time.perf_counter() > deadline or (node_limit is not None and self.nodes >= node_limit):
                 return self._outcome(limited=True)
@@ -142,10 +143,22 @@ class Search:
         return None
 
     def _least_smoothing(self, modes: tuple[int, ...]) -> float:
+        """Least smoothing cost of one finger's modes, free positions outside the object: a small search over regions."""
         if modes not in self.smoothing:
             column = np.array(modes)[:, None]
-            self.smoothing[modes] = least_smoothing(self.model, column, np.full_like(column, -1))[0]
+            self.smoothing[modes] = self._outside(column, np.full_like(column, -1), np.inf)
         return self.smoothing[modes]
+
+    def _outside(self, column: IntArray, assigned: IntArray, limit: float) -> float:
+        bound, t = least_smoothing(self.model, column, assigned)
+        if t < 0 or bound >= limit:
+            return bound
+        least = limit
+        for region in range(self.model.region.shape[1]):
+            assigned[t, 0] = region
+            least = min(least, max(bound, self._outside(column, assigned, least)))
+        assigned[t, 0] = -1
+        return least
 
     # complete sequences
 
@@ -168,8 +181,8 @@ class Search:
             return
         if found.intrusion[2] > 0:
             self._dive(leaf, found.last)
-        for child in self._children(bound, leaf, found):
-            self._push(bound, child)
+        for least, child in self._children(bound, leaf, found):
+            self._push(least, child)
 
     def _relax(self, leaf: Leaf) -> Relaxed:
         found = relax(
@@ -196,13 +209,14 @@ class Search:
                 return
             z = found.last
 
-    def _children(self, bound: float, leaf: Leaf, found: Relaxed) -> Iterator[Leaf]:
+    def _children(self, bound: float, leaf: Leaf, found: Relaxed) -> Iterator[tuple[float, Leaf]]:
         t, c, depth = found.intrusion
         if depth > 0:
             for region in range(self.model.region.shape[1]):
                 assigned = leaf.assigned.copy()
                 assigned[t, c] = region
-                yield Leaf(leaf.sequence, leaf.lo, leaf.hi, assigned, narrowed=True)
+                apart = found.forces + self._assigned_smoothing(leaf.sequence.modes, assigned)
+                yield max(bound, apart), Leaf(leaf.sequence, leaf.lo, leaf.hi, assigned, narrowed=True)
             return
         width = leaf.hi - leaf.lo
         error = np.where(width > NARROWEST, np.maximum(found.chord_error, 0) + 1e-12 * width, -1)
@@ -214,4 +228,10 @@ class Search:
         for lo, hi in ((leaf.lo[k], at), (at, leaf.hi[k])):
             low, high = leaf.lo.copy(), leaf.hi.copy()
             low[k], high[k] = lo, hi
-            yield Leaf(leaf.sequence, low, high, leaf.assigned)
+            yield bound, Leaf(leaf.sequence, low, high, leaf.assigned)
+
+    def _assigned_smoothing(self, modes: IntArray, assigned: IntArray) -> float:
+        return sum(
+            least_smoothing(self.model, modes[:, c : c + 1].copy(), assigned[:, c : c + 1].copy())[0]
+            for c in range(self.fingers)
+        )

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from expert.contact.model import Model
-from expert.contact.qp import SOLVED, solve_qp
+from expert.contact.qp import INFEASIBLE, SOLVED, solve_qp
 from expert.geometry.pose import Array
 from expert.types import IntArray
 
@@ -167,24 +167,37 @@ def least_over_box(model: Model, z: Array, slope: Array, lo: Array, hi: Array) -
 
 
 @njit(cache=True)
-def least_smoothing(model: Model, modes: IntArray, assigned: IntArray) -> tuple[float, Array]:
-    """Lower bound of the smoothing cost of a mode sequence (0: the solver failed; inf: rho has no room), and where."""
+def least_smoothing(model: Model, modes: IntArray, assigned: IntArray) -> tuple[float, int]:
+    """Lower bound of the smoothing cost of one finger's modes (S, 1) with its regions (inf: no room), and the step to
+    branch on: where the finger is deepest inside the object, -1 if nowhere."""
     s = sequence_of(model, modes)
     if (s.lo > s.hi).any():
-        return np.inf, s.reference
+        return np.inf, -1
+    if s.size == 0:
+        return s.q0, -1
     A, b = standing_rows(model, s, s.lo, s.hi, assigned, s.size)
     ridge = FLAT * (1 + model.acceleration_weight)
     H = s.Q + ridge * np.eye(s.size)
     status, z, u = solve_qp(H, s.q - ridge * s.reference, A, b, 0, model.iterations)
-    if status != SOLVED:
-        return 0.0, s.reference
-    slope = s.Q @ z + s.q
-    bound = smoothing(s, z)
+    slope, bound = s.Q @ z + s.q, smoothing(s, z)
+    if status == INFEASIBLE:
+        slope[:], bound = 0.0, 0.0
     for i in range(b.size):
         weight = max(u[i], 0.0)
-        bound += weight * (b[i] - A[i] @ z)
-        slope -= weight * A[i]
-    return max(0.0, bound + least_over_box(model, z, slope, s.lo, s.hi)), z
+        bound += weight * b[i]
+        for j in range(z.size):
+            slope[j] -= weight * A[i, j]
+            if status == SOLVED:
+                bound -= weight * A[i, j] * z[j]
+    if status == INFEASIBLE:
+        z[:] = 0.0
+    bound += least_over_box(model, z, slope, s.lo, s.hi)
+    if status == INFEASIBLE and bound > 1e-9 * (1 + u.max()):
+        return np.inf, -1
+    if status != SOLVED:
+        return 0.0, -1
+    t, _, _ = worst_intrusion(model, s, z, assigned)
+    return max(0.0, bound), t
 
 
 @njit(cache=True)
