@@ -55,10 +55,9 @@ PARAMETERS = {
     "force_limits": Field("f", "ntcb", "normal force of a pushing finger [N]"),
     "region_normals": Field("f", "ntchd", "half-planes A p <= b that a free finger keeps to: A"),
     "region_offsets": Field("f", "ntch", "and b [m]"),
-    "external_points": Field("f", "nted", "floor contacts [m]"),
-    "external_cones": Field(
-        "f", "ntejd", "rays of their forces, unit normal component; zero where there are none"
-    ),
+    "external_contact": Field("f", "nte", "1 where the object touches the floor"),
+    "external_points": Field("f", "nted", "where [m]"),
+    "external_cones": Field("f", "ntejd", "rays of the floor's forces, unit normal component"),
     "reference_positions": Field("f", "ntcd", "where the torque is linearised: positions [m]"),
     "reference_forces": Field("f", "ntcd", "and forces [N]"),
 }

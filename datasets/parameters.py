@@ -30,7 +30,8 @@ class MechanicalParameters:
     stick (t, c)             1 where it keeps its place to the next step (to the end, at the last): only then may it push.
     force_limits (t, c, 2)   least and largest normal force of a pushing finger [N].
     region_normals (t, c, h, d), region_offsets (t, c, h)   free fingers: A p <= b; empty rows are 0 . p <= 1.
-    external_points (t, e, d), external_cones (t, e, k, d)  ground contacts; a sliding one has one ray, an absent one none.
+    external_contact (t, e), external_points (t, e, d), external_cones (t, e, k, d)   ground contacts: 1 where there is one, where,
+                             and its cone; both rays of a sliding contact are the same, fillers are zero rays at the centre of mass.
     reference_positions, reference_forces (t, c, d)         where the torque is linearised: the expert's plan.
     """
 
@@ -43,6 +44,7 @@ class MechanicalParameters:
     force_limits: Array
     region_normals: Array
     region_offsets: Array
+    external_contact: Array
     external_points: Array
     external_cones: Array
     reference_positions: Array
@@ -77,6 +79,7 @@ def field_shapes(
         "force_limits": (fingers, 2),
         "region_normals": (fingers, rows, 2),
         "region_offsets": (fingers, rows),
+        "external_contact": (external,),
         "external_points": (external, 2),
         "external_cones": (external, 2, 2),
         "reference_positions": (fingers, 2),
@@ -93,7 +96,7 @@ def parameters_of(task: ContactTask, plan: Plan, *, rows: int = REGION_ROWS) -> 
     _check_expressible(task, plan)
     facet, touching = contact_facets(plan.modes), plan.modes != FREE
     normals, offsets = _free_rows(task, plan, rows)
-    points, external_cones = _external(task)
+    present, points, external_cones = _external(task)
     return MechanicalParameters(
         poses=task.trajectory.poses,
         wrench=inertial_wrench(task),
@@ -106,6 +109,7 @@ def parameters_of(task: ContactTask, plan: Plan, *, rows: int = REGION_ROWS) -> 
         ),
         region_normals=normals,
         region_offsets=offsets,
+        external_contact=present,
         external_points=points,
         external_cones=external_cones,
         reference_positions=plan.positions,
@@ -188,7 +192,7 @@ def _free_rows(task: ContactTask, plan: Plan, rows: int) -> tuple[Array, Array]:
     """Half-planes (T, C, rows, 2), (T, C, rows) of each free finger: the object's free region it is in, and the walls."""
     normals = np.zeros((*plan.modes.shape, rows, 2))
     offsets = np.full((*plan.modes.shape, rows), NO_ROW)
-    regions = free_regions(task.body.vertices)
+    regions = free_regions(task.body.vertices, task.robustness.free_clearance)
     for t, c in np.argwhere(plan.modes == FREE):
         region = _region_of(task, regions, int(t), plan.positions[t, c])
         walls = [(-w.normal, -(w.normal @ w.point) - task.fingers.clearance) for w in task.environment.walls]
@@ -206,12 +210,13 @@ def _region_of(task: ContactTask, regions: list[Region], t: int, position: Array
     """The free region that holds the position most deeply, drawn in by the clearance, in the world frame at step t."""
     pose = task.trajectory.poses[t]
     turn = rotation(pose[2])
-    in_world = [Region(r.A @ turn.T, r.b + r.A @ turn.T @ pose[:2] - task.fingers.clearance) for r in regions]
+    in_world = [Region(r.A @ turn.T, r.b + r.A @ turn.T @ pose[:2]) for r in regions]
     return max(in_world, key=lambda r: float((r.b - r.A @ position).min()))
 
 
-def _external(task: ContactTask) -> tuple[Array, Array]:
-    """Points (T, E, 2) and rays (T, E, 2, 2) of the ground contacts; absent ones sit at the centre of mass without rays."""
+def _external(task: ContactTask) -> tuple[Array, Array, Array]:
+    """Flags (T, E), points (T, E, 2) and rays (T, E, 2, 2) of the ground contacts, absent ones last."""
+    present = np.zeros((task.steps, EXTERNAL_CONTACTS))
     points = np.repeat(task.trajectory.poses[:, None, :2], EXTERNAL_CONTACTS, axis=1)
     rays = np.zeros((task.steps, EXTERNAL_CONTACTS, 2, 2))
     for t in range(task.steps):
@@ -223,6 +228,9 @@ def _external(task: ContactTask) -> tuple[Array, Array]:
                 got=f"{len(here)} at step {t}",
             )
         for e, contact in enumerate(here):
-            points[t, e] = contact.point
-            rays[t, e, : len(contact.rays)] = contact.rays
-    return points, rays
+            present[t, e], points[t, e], rays[t, e] = (
+                1.0,
+                contact.point,
+                contact.rays,
+            )  # one ray fills both places
+    return present, points, rays

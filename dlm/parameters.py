@@ -11,14 +11,14 @@ from torch import Tensor
 from datasets.parameters import EXTERNAL_CONTACTS, REGION_ROWS, MechanicalParameters, field_shapes
 from expert.types import require
 
-FLAGS = ("contact", "stick")
+FLAGS = ("contact", "stick", "external_contact")
 
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterBatch:
     """P(t) of a batch of tasks: the fields of `datasets.parameters.MechanicalParameters` with a leading batch axis.
 
-    Shapes (b, t, ...), SI units, world frame.  The flags `contact` and `stick` may take any value from 0 to 1.
+    Shapes (b, t, ...), SI units, world frame.  The FLAGS may take any value from 0 to 1.
     """
 
     poses: Tensor
@@ -30,6 +30,7 @@ class ParameterBatch:
     force_limits: Tensor
     region_normals: Tensor
     region_offsets: Tensor
+    external_contact: Tensor
     external_points: Tensor
     external_cones: Tensor
     reference_positions: Tensor
@@ -141,7 +142,8 @@ class Layout:
             "cones": target.contact[..., None, None],
             "region_normals": (target.region_normals != 0).any(-1, keepdim=True),
             "region_offsets": (target.region_normals != 0).any(-1),
-            "external_points": (target.external_cones != 0).any(-1).any(-1, keepdim=True),
+            "external_points": target.external_contact[..., None],
+            "external_cones": target.external_contact[..., None, None],
         }
         columns = []
         for name, value in target.tensors().items():

@@ -39,6 +39,7 @@ class QPSize:
             "contact": (t, c),
             "free": (t, c),
             "idle": (t, c),
+            "absent": (t, e),
             "sticks": (t - 1, c),
             "slips": (t - 1, c),
             "least": (t, c),
@@ -53,8 +54,8 @@ class QPData:
     """Parameters of one batch of programs; lengths over L, forces over F, torques over F L.
 
     wrench: what all contacts exert.  arm, couple, anchor, offset: p_ref - r, lambda_ref, p_ref, sum_c p_ref x lambda_ref.
-    rays: of the fingers; zero where one must not push.  ground_rays, ground_torque: of the ground.
-    start, edge: facets start + rho edge.  contact, free = 1 - contact, idle = 1 - stick, sticks, slips = 1 - sticks: flags.
+    rays: of the fingers; zero where one must not push.  ground_rays, ground_torque: of the ground; zero without contact.
+    start, edge: facets start + rho edge.  contact, free = 1 - contact, idle = 1 - stick, sticks, slips = 1 - sticks, absent: flags.
     least, most: normal forces.  normals, bounds: regions A p <= b.
     """
 
@@ -71,6 +72,7 @@ class QPData:
     contact: Tensor
     free: Tensor
     idle: Tensor
+    absent: Tensor
     sticks: Tensor
     slips: Tensor
     least: Tensor
@@ -129,6 +131,8 @@ def qp_data(parameters: ParameterBatch, *, length: float, force: float, couple: 
     position, reference = P.reference_positions / L, P.reference_forces / F * float(couple)
     contact, stick = P.contact.clamp(0, 1), P.stick.clamp(0, 1)
     most = (P.force_limits[..., 1] / F).clamp(min=0)
+    present = P.external_contact.clamp(0, 1)
+    ground = P.external_cones * present[..., None, None]
     return QPData(
         wrench=P.wrench / P.wrench.new_tensor([F, F, F * L]),
         arm=position - centre,
@@ -136,13 +140,14 @@ def qp_data(parameters: ParameterBatch, *, length: float, force: float, couple: 
         anchor=position,
         offset=cross(position, reference).sum(-1),
         rays=P.cones * stick[..., None, None],
-        ground_rays=P.external_cones,
-        ground_torque=cross((P.external_points / L - centre)[..., None, :], P.external_cones),
+        ground_rays=ground,
+        ground_torque=cross((P.external_points / L - centre)[..., None, :], ground),
         start=P.facets[..., 0, :] / L,
         edge=(P.facets[..., 1, :] - P.facets[..., 0, :]) / L,
         contact=contact,
         free=1 - contact,
         idle=1 - stick,
+        absent=1 - present,
         sticks=stick[:, :-1],
         slips=1 - stick[:, :-1],
         least=torch.minimum((P.force_limits[..., 0] / F).clamp(min=0), most),

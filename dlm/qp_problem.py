@@ -113,11 +113,12 @@ def cost(x: Variables, P: Parameters, w: QPWeights) -> cp.Expression:
         (w.hold, _weigh(P["contact"], x.away)),
         (w.hold, cp.multiply(P["sticks"], x.slip)),
         (w.filler, _weigh(P["idle"], x.alpha)),
+        (w.filler, _weigh(P["absent"], x.beta)),
         (w.filler, cp.multiply(P["free"], x.rho - 0.5)),
         (w.anchor, x.p - P["anchor"]),
         (w.ridge, x.beta),
     ]
-    # One norm instead of eight: the cone program has one second-order cone then.
+    # One norm instead of nine: the cone program has one second-order cone then.
     total = cp.sum_squares(cp.hstack([weight**0.5 * cp.vec(term, order="C") for weight, term in squares]))
     slack = 0 if w.slack is None else w.slack * cp.sum(cp.abs(x.eps)) + w.out * cp.sum(x.out)
     return total + slack
