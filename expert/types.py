@@ -181,7 +181,7 @@ class Trajectory:
 class Fingers:
     """Point fingers: count C, friction coefficient, largest normal force [N], fraction kept from facet ends, clearance [m].
 
-    clearance is kept from walls always and from the object where a finger is free.
+    clearance is kept from walls; what free fingers keep from the object is Robustness.free_clearance.
     """
 
     count: int
@@ -227,12 +227,14 @@ class Robustness:
     support_inset: share of the contact width by which line contacts with walls are drawn in.
     min_normal_force: least normal force of a finger wherever it may push [N].
     min_interval: least number of steps that a contact lasts.
+    free_clearance: distance that a finger without contact keeps from the object [m].
     """
 
     cone_fraction: float = 1.0
     support_inset: float = 0.0
     min_normal_force: float = 0.0
     min_interval: int = 1
+    free_clearance: float = 0.0
 
     def __post_init__(self) -> None:
         require(
@@ -250,6 +252,8 @@ class Robustness:
         least = self.min_normal_force
         require(0 <= least < np.inf, "robustness.min_normal_force", "a force >= 0 in newtons", least)
         require(self.min_interval in (1, 2), "robustness.min_interval", "1 or 2", self.min_interval)
+        away = self.free_clearance
+        require(0 <= away < np.inf, "robustness.free_clearance", "a length >= 0 in metres", away)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -157,13 +157,14 @@ def _read_cost(file: Section) -> Cost:
 
 
 def _read_robustness(file: Section) -> Robustness:
-    keys = ("cone_fraction", "support_inset", "min_normal_force", "min_interval")
+    keys = ("cone_fraction", "support_inset", "min_normal_force", "min_interval", "free_clearance")
     section = file.section("robustness", keys, optional=True)
     return Robustness(
         cone_fraction=section.number("cone_fraction", 1.0),
         support_inset=section.number("support_inset", 0.0),
         min_normal_force=section.number("min_normal_force", 0.0),
         min_interval=section.integer("min_interval", 1, least=1),
+        free_clearance=section.number("free_clearance", 0.0),
     )
 
 

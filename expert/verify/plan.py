@@ -140,7 +140,7 @@ def _finger_places(task: ContactTask, plan: Plan, limits: Tolerances) -> tuple[C
     named = {
         "on_facet": np.where(touching, _distance_to_facet(task, plan), 0.0),
         "penetration": -distance,
-        "clearance": np.where(touching, 0.0, task.fingers.clearance - distance),
+        "clearance": np.where(touching, 0.0, task.robustness.free_clearance - distance),
         "wall_clearance": task.fingers.clearance - wall_gap.min(axis=0),
     }
     return tuple(

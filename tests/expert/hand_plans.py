@@ -14,6 +14,7 @@ from expert.types import (
     Fingers,
     HalfPlane,
     Plan,
+    Robustness,
     Trajectory,
 )
 

@@ -133,10 +133,10 @@ TAMPERED = {
             ),
         ),
     ),
-    "free finger too close": (
+    "free finger inside the block": (
         pushed_block,
-        "clearance",
-        lambda p: replace(p, positions=changed(p.positions, (2, 1), [0.02, A + 1e-3])),
+        "penetration",
+        lambda p: replace(p, positions=changed(p.positions, (2, 1), [0.02, A - 1e-3])),
     ),
     "support drags forward": (
         pushed_block,
@@ -215,6 +215,11 @@ STRICTER = {
         sliding_block,
         "wall_clearance",
         lambda t: replace(t, fingers=replace(t.fingers, clearance=1.1 * A)),
+    ),
+    "clearance from the block": (
+        pushed_block,
+        "clearance",
+        lambda t: replace(t, robustness=Robustness(free_clearance=0.16)),
     ),
     "dearer force": (sliding_block, "objective", lambda t: replace(t, cost=Cost(force=2.0))),
     "reward for the cone's middle": (sliding_block, "objective", lambda t: replace(t, cost=Cost(margin=1.0))),
