@@ -58,6 +58,13 @@ KINDS: dict[str, Kind] = {
         verify="expert.verify.plan:verify",
         draw="expert.drawing.contact_trajectory:draw",
     ),
+    "cage": Kind(
+        format="expert.files.cage",
+        solve="expert.caging.synthesis:solve",
+        verify="expert.verify.cage:verify",
+        draw="expert.drawing.cage:draw",
+        solved=("caged",),
+    ),
 }
 
 

@@ -2,6 +2,7 @@
 
 import numba
 import numpy as np
+import shapely
 
 from expert.geometry.convex import convex_pieces
 from expert.geometry.polygon import facet_frames
@@ -57,7 +58,17 @@ def overlapping_cover(vertices: Array) -> list[Array]:
         ]
         rotations = [doors[i:] + doors[:i] for i in range(len(doors))] or [[]]
         grown += [_grow(part, order) for order in rotations]
-    return grown
+    return _maximal(grown)
+
+
+def _maximal(pieces: list[Array]) -> list[Array]:
+    """Without the pieces that lie inside others."""
+    polygons = sorted((shapely.Polygon(p) for p in pieces), key=lambda p: -p.area)
+    kept: list[shapely.Polygon] = []
+    for polygon in polygons:
+        if not any(larger.covers(polygon) for larger in kept):
+            kept.append(polygon)
+    return [np.array(p.exterior.coords)[:-1] for p in kept]
 
 
 def _shared_edge(part: Array, other: Array) -> tuple[Array, Array] | None:

@@ -30,7 +30,7 @@ TURN = 45 * 128
 COARSEST = 128
 """Width of a cell before refinement, in units: 8 degrees."""
 
-_GRID = 1e-9
+GRID = 1e-9
 """Overlays may move corners by this: far less than INNER_MARGIN and than the tolerance of the exact path check."""
 
 Geometries = np.ndarray[tuple[int, ...], np.dtype[Any]]
@@ -47,6 +47,11 @@ class Cell(NamedTuple):
         """First and last orientation relative to the start [rad]."""
         return self.start * 2 * np.pi / TURN, (self.start + self.width) * 2 * np.pi / TURN
 
+    @property
+    def half_width(self) -> float:
+        """[rad]."""
+        return self.width * np.pi / TURN
+
 
 START = Cell(0, 0)
 
@@ -56,7 +61,7 @@ class Components:
     """Connected parts of a cell's free space (polygons) and which of them reach to infinity."""
 
     polygons: Geometries
-    unbounded: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    unbounded: list[bool]
 
 
 @dataclass(frozen=True)
@@ -101,9 +106,12 @@ class CellComplex:
     """Free components of the cells of one arrangement, computed when asked for and kept.
 
     slack: inner shapes are eroded by this length [m] more, so that they stay obstacles wherever fingers move by less.
+    on_grid: overlays on a grid of GRID, robust and slower, instead of in plain doubles.
     """
 
-    def __init__(self, arrangement: Arrangement, slack: float = 0.0) -> None:
+    def __init__(self, arrangement: Arrangement, slack: float = 0.0, *, on_grid: bool = False) -> None:
+        self._arguments = arrangement, slack
+        self._grid = GRID if on_grid else None
         self.frame = Frame.of(arrangement)
         self.fingers = self.frame.relative(arrangement.fingers)
         self.walls = self.frame.relative(arrangement.walls)
@@ -111,49 +119,63 @@ class CellComplex:
         self._erosion = INNER_MARGIN + slack / self.frame.radius
         obstacles = np.concatenate([self.fingers, self.walls.reshape(-1, 2), np.zeros((1, 2))])
         self.box = shapely.box(*(obstacles.min(axis=0) - 2.5), *(obstacles.max(axis=0) + 2.5))
-        self._components: dict[tuple[Cell, bool], Components] = {}
-        self._passages: dict[tuple[Cell, Cell], dict[tuple[int, int], shapely.Geometry]] = {}
+        self._inner: dict[Cell, Components] = {}
+        self._outer: dict[Cell, Components] = {}
+        self._within: dict[Cell, list[int]] = {}
+        self._passages: dict[tuple[Cell, Cell], list[dict[int, shapely.Geometry]]] = {}
+
+    def on_grid(self) -> "CellComplex":
+        """The same cells, not yet computed, on a grid."""
+        return CellComplex(*self._arguments, on_grid=True)
 
     @property
     def evaluated(self) -> int:
         """How many cells were looked at."""
-        return sum(inner for _, inner in self._components)
+        return len(self._inner)
 
     def inner(self, cell: Cell) -> Components:
         """Components outside the inner obstacles: every free configuration of the cell is in one of them."""
-        return self._free(cell, inner=True)
+        if cell not in self._inner:
+            self._inner[cell] = self._free(cell, self._inner_shape(cell.half_width))
+        return self._inner[cell]
 
     def outer(self, cell: Cell) -> Components:
         """Components outside the outer obstacles: free at every orientation of the cell."""
-        return self._free(cell, inner=False)
+        if cell not in self._outer:
+            self._outer[cell] = self._free(cell, self._outer_shape(cell.half_width))
+        return self._outer[cell]
 
     def has_outer(self, cell: Cell) -> bool:
         """Whether `outer` was asked for this cell."""
-        return (cell, False) in self._components
+        return cell in self._outer
 
-    def passages(self, a: Cell, b: Cell) -> dict[tuple[int, int], shapely.Geometry]:
-        """Positions free at every orientation of both cells, by pairs of outer components with a common interior."""
+    def within(self, cell: Cell) -> list[int]:
+        """For each outer component the inner one that contains it."""
+        if cell not in self._within:
+            outer, inner = self.outer(cell).polygons, self.inner(cell).polygons
+            met = shapely.intersects(outer[:, None], inner[None])
+            self._within[cell] = [int(k) for k in met.argmax(axis=1)] if len(outer) else []
+        return self._within[cell]
+
+    def passages(self, a: Cell, b: Cell) -> list[dict[int, shapely.Geometry]]:
+        """For each outer component of a, by outer components of b: the positions they share, where those have area."""
         if (a, b) not in self._passages:
             first, second = self.outer(a).polygons, self.outer(b).polygons
             i, j = np.nonzero(shapely.intersects(first[:, None], second[None]))
             common = _common(first[i], second[j])
-            wide = shapely.area(common) > 1e-12
-            found = {(int(m), int(n)): g for m, n, g in zip(i[wide], j[wide], common[wide], strict=True)}
-            self._passages[a, b] = found
-            self._passages[b, a] = {(n, m): g for (m, n), g in found.items()}
+            forth: list[dict[int, shapely.Geometry]] = [{} for _ in first]
+            back: list[dict[int, shapely.Geometry]] = [{} for _ in second]
+            for m, n, shared, area in zip(i, j, common, shapely.area(common), strict=True):
+                if area > 1e-12:
+                    forth[m][int(n)] = back[n][int(m)] = shared
+            self._passages[a, b], self._passages[b, a] = forth, back
         return self._passages[a, b]
 
-    def _free(self, cell: Cell, *, inner: bool) -> Components:
-        key = (cell, inner)
-        if key not in self._components:
-            half = np.pi * cell.width / TURN
-            shape = self._inner_shape(half) if inner else self._outer_shape(half)
-            obstacles = self._obstacles(shape, sum(cell.bounds) / 2)
-            polygons = shapely.get_parts(np.array([_outside(self.box, obstacles)]))
-            reach = shapely.bounds(polygons)
-            unbounded = (np.abs(reach - shapely.bounds(self.box)) <= 1e-9).any(axis=1)
-            self._components[key] = Components(polygons, unbounded)
-        return self._components[key]
+    def _free(self, cell: Cell, shape: SweptShape) -> Components:
+        obstacles = self._obstacles(shape, sum(cell.bounds) / 2)
+        polygons = shapely.get_parts(np.array([_outside(self.box, obstacles, self._grid)]))
+        rim = np.abs(shapely.bounds(polygons) - shapely.bounds(self.box)) <= 1e-9
+        return Components(polygons, rim.any(axis=1).tolist())
 
     def _inner_shape(self, half: float) -> SweptShape:
         return _inner_shape(*self._shape_key(), half, self._erosion)
@@ -177,13 +199,15 @@ class CellComplex:
         return obstacles
 
 
-def _outside(box: shapely.Polygon, obstacles: list[shapely.Geometry]) -> shapely.Geometry:
-    """Box minus obstacles.  Where doubles defeat the overlay, all corners move to a grid far finer than INNER_MARGIN."""
+def _outside(box: shapely.Polygon, obstacles: list[shapely.Geometry], grid: float | None) -> shapely.Geometry:
+    """Box minus obstacles; where doubles defeat the overlay outright, on the grid."""
     try:
-        return box.difference(shapely.union_all(obstacles))
+        union = shapely.union_all(obstacles, grid_size=grid)
+        return shapely.difference(box, union, grid_size=grid)
     except shapely.GEOSException:
-        union = shapely.union_all(obstacles, grid_size=_GRID)
-        return shapely.difference(box, union, grid_size=_GRID)
+        if grid is not None:
+            raise
+        return _outside(box, obstacles, GRID)
 
 
 def _common(a: Geometries, b: Geometries) -> Geometries:
@@ -191,7 +215,7 @@ def _common(a: Geometries, b: Geometries) -> Geometries:
     try:
         return shapely.intersection(a, b)
     except shapely.GEOSException:
-        return shapely.intersection(a, b, grid_size=_GRID)
+        return shapely.intersection(a, b, grid_size=GRID)
 
 
 @lru_cache(maxsize=64)
@@ -216,8 +240,8 @@ def _outer_shape(vertices: bytes, centre: tuple[float, float], radius: float, ha
 
 def _swept(parts: list[Array]) -> SweptShape:
     solid = tuple(part for part in parts if len(part) >= 3)
-    union = shapely.union_all([shapely.Polygon(part) for part in solid], grid_size=_GRID)
-    union = shapely.simplify(union, _GRID)  # corners a few ulps apart would make invalid copies when moved
+    union = shapely.union_all([shapely.Polygon(part) for part in solid], grid_size=GRID)
+    union = shapely.simplify(union, GRID)  # corners a few ulps apart would make invalid copies when moved
     return SweptShape(solid, union, shapely.get_coordinates(union))
 
 
