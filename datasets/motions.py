@@ -247,6 +247,7 @@ class Tasks:
             support_inset=self.support_inset,
             min_normal_force=self.least_push * self.mass * self.gravity,
             min_interval=self.min_interval,
+            free_clearance=self.clearance,
         )
 
 

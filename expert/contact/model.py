@@ -159,11 +159,8 @@ def wall_rows(task: ContactTask) -> Array:
 
 
 def region_rows(task: ContactTask) -> Array:
-    """Convex regions around the object, drawn in by the clearance: rows (a, b) of a.x <= b, (T, R, H, 3), world frame.
-
-    Sound for non-convex objects too: what lies in a pocket's piece keeps the clearance from all around that piece.
-    """
-    regions = free_regions(task.body.vertices)
+    """Convex regions around the object with its clearance: rows (a, b) of a.x <= b, (T, R, H, 3), world frame."""
+    regions = free_regions(task.body.vertices, task.robustness.free_clearance)
     most = max(len(r.b) for r in regions)
     rows = np.tile(np.array([0.0, 0.0, 1.0]), (task.steps, len(regions), most, 1))
     turn = rotation(task.trajectory.poses[:, 2])
@@ -171,7 +168,7 @@ def region_rows(task: ContactTask) -> Array:
         normals = np.einsum("tij,hj->thi", turn, region.A)
         shift = np.einsum("thi,ti->th", normals, task.trajectory.poses[:, :2])
         rows[:, k, : len(region.b), :2] = normals
-        rows[:, k, : len(region.b), 2] = region.b - task.fingers.clearance + shift
+        rows[:, k, : len(region.b), 2] = region.b + shift
     return rows
 
 
@@ -181,7 +178,7 @@ def parking_place(task: ContactTask) -> Array:
     angles = np.pi / 2 + np.pi * np.array([0, 1, -1, 2, -2, 3, -3, 4]) / 4
     directions = np.column_stack([np.cos(angles), np.sin(angles)])
     middle = poses[:, :2].mean(axis=0)
-    radius = 1.2 * L + task.fingers.clearance + np.abs(poses[:, :2] - middle).max() * np.sqrt(2)
+    radius = 1.2 * L + task.robustness.free_clearance + np.abs(poses[:, :2] - middle).max() * np.sqrt(2)
     for place in middle + radius * directions:
         if all(w.gap(place) >= task.fingers.clearance for w in task.environment.walls):
             return place

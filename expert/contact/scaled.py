@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 
-from expert.geometry.convex import Region, free_regions
+from expert.geometry.convex import free_regions
 from expert.geometry.pose import Array, rotation, to_world
 from expert.mechanics import ExternalContact, external_contacts, friction_rays, required_wrench, wrench_about
 from expert.types import ContactTask
@@ -107,7 +106,7 @@ def _regions(task: ContactTask) -> tuple[Array, Array]:
 
     Sides are padded with 0 p <= 1.
     """
-    regions = clear_regions(task.body.vertices, task.fingers.clearance)
+    regions = free_regions(task.body.vertices, task.robustness.free_clearance)
     sides = max(len(r.b) for r in regions)
     A_b, b_b = np.zeros((len(regions), sides, 2)), np.ones((len(regions), sides))
     for k, region in enumerate(regions):
@@ -118,19 +117,12 @@ def _regions(task: ContactTask) -> tuple[Array, Array]:
     return A, b_b + np.einsum("trhd,td->trh", A, q[:, :2])
 
 
-def clear_regions(vertices: Array, clearance: float) -> list[Region]:
-    """Convex regions (body frame) whose points keep `clearance` [m] from the polygon: outside of its mitred offset."""
-    if clearance == 0:
-        return free_regions(vertices)
-    grown = shapely.Polygon(vertices).buffer(clearance, join_style="mitre", mitre_limit=1e3)
-    outline = np.array(shapely.geometry.polygon.orient(grown).exterior.coords)[:-1]
-    return free_regions(outline)
-
-
 def _workspace(task: ContactTask) -> Array:
     """Box (2, d) [m] for finger positions: what the object sweeps, and beyond it the reach of a finger that
     leaves at the speed of the fastest vertex and is never slowed down (more would cost acceleration for nothing)."""
     vertices = to_world(task.trajectory.poses, task.body.vertices)
     fastest = np.linalg.norm(np.diff(vertices, axis=0), axis=2).max()
-    reach = task.body.size + task.steps * fastest + task.fingers.clearance
+    reach = (
+        task.body.size + task.steps * fastest + max(task.fingers.clearance, task.robustness.free_clearance)
+    )
     return np.stack([vertices.min(axis=(0, 1)) - reach, vertices.max(axis=(0, 1)) + reach])

@@ -41,16 +41,31 @@ def convex_pieces(vertices: Array) -> list[Array]:
     return [vertices[p] for p in pieces]
 
 
-def free_regions(vertices: Array) -> list[Region]:
-    """Convex regions that cover the outside of a polygon: beyond each facet of its hull, and its pockets."""
+def free_regions(vertices: Array, clearance: float = 0.0) -> list[Region]:
+    """Convex regions that cover the outside of a polygon: beyond each facet of its hull, and its pockets.
+
+    Their points keep `clearance` [m]: they cover the outside of the polygon's mitred offset.
+    """
     hull = np.array(shapely.MultiPoint(vertices).convex_hull.exterior.coords)[:-1]
     hull = hull if cross(hull[1] - hull[0], hull[2] - hull[0]) > 0 else hull[::-1]
     inward, _ = facet_frames(hull)
-    regions = [Region(n[None], np.array([n @ a])) for n, a in zip(inward, facets(hull)[0], strict=True)]
+    regions = [
+        Region(n[None], np.array([n @ a - clearance])) for n, a in zip(inward, facets(hull)[0], strict=True)
+    ]
     if not is_convex(vertices):
-        for pocket in _pockets(vertices, hull):
+        for pocket in _pockets(*_grown(vertices, hull, clearance)):
             regions += [Region.of_polygon(piece) for piece in convex_pieces(pocket)]
     return regions
+
+
+def _grown(vertices: Array, hull: Array, clearance: float) -> tuple[Array, Array]:
+    """The mitred offset of a polygon and its hull, counter-clockwise."""
+    if clearance == 0:
+        return vertices, hull
+    grown = shapely.Polygon(vertices).buffer(clearance, join_style="mitre", mitre_limit=1e3)
+    outline = np.array(shapely.geometry.polygon.orient(grown).exterior.coords)[:-1]
+    around = shapely.geometry.polygon.orient(shapely.MultiPoint(outline).convex_hull)
+    return outline, np.array(around.exterior.coords)[:-1]
 
 
 def _pockets(vertices: Array, hull: Array) -> list[Array]:
