@@ -14,7 +14,6 @@ from expert.types import (
     Fingers,
     HalfPlane,
     Plan,
-    Robustness,
     Trajectory,
 )
 
