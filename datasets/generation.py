@@ -1,5 +1,6 @@
 """Making a data set in parallel, shard by shard, so that a job killed at any moment goes on where it stopped."""
 
+import functools
 import os
 import platform
 import signal
@@ -82,6 +83,7 @@ class Generation:
         return {**head, "fingerprint": sha256(repr(head).encode())[:16]}
 
 
+@functools.cache
 def versions() -> dict[str, str]:
     """Python, packages, and a checksum of the code that decides the data."""
     sources = [p for package in (expert, datasets) for p in sorted(Path(package.__path__[0]).rglob("*.py"))]

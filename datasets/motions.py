@@ -163,7 +163,7 @@ def sample_motion(
         if not phases:
             continue
         swept = to_world(poses_of(rest.pose, phases, BETWEEN * (steps - 1) + 1), body.vertices)
-        if _clears_floor(swept, phases[-1]):
+        if _clears_floor(swept, phases):
             poses = poses_of(rest.pose, phases, steps)
             poses[:, 0] += rng.uniform(-spread, spread) - (swept[..., 0].min() + swept[..., 0].max()) / 2
             return Trajectory.of(poses, dt, "rest")
@@ -176,14 +176,18 @@ def _check_steps(steps: int, field: str) -> None:
     require(steps >= 5 and steps % 2 == 1, field, "an odd number >= 5, so that two phases share it", steps)
 
 
-def _clears_floor(swept: Array, last: Phase) -> bool:
-    """No vertex of the swept polygons (n, V, 2) enters the floor, and what a last tilt or lift raises ends well above it."""
+def _clears_floor(swept: Array, phases: list[Phase]) -> bool:
+    """No vertex of the swept polygons (n, V, 2) enters the floor, and what a tilt or lift raises ends the phase well above it."""
     heights = swept[..., 1]
-    if heights.min() < -1e-9:
-        return False
-    slides = last.pivot is None and last.shift[1] == 0
-    aloft = np.sort(heights[-1])[1 if last.pivot is not None else 0 :]
-    return bool(slides or aloft.min() >= AIR)
+    ends = heights[:: (len(heights) - 1) // len(phases)][1:]
+    return heights.min() > -1e-9 and all(map(_is_aloft, ends, phases))
+
+
+def _is_aloft(heights: Array, phase: Phase) -> bool:
+    """Heights (V,) at the end of a phase: all above AIR, but for the pivot of a tilt; a slide may stay as low as it is."""
+    if phase.pivot is not None:
+        return bool(np.sort(heights)[1] >= AIR)
+    return phase.shift[1] == 0 or bool(heights.min() >= AIR)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -33,10 +33,18 @@ class Shapes:
     slightest_turn: float = 0.1
 
     def __post_init__(self) -> None:
-        few, many = (int(n) for n in readonly(self.facets, (2,), "shapes.facets"))
-        require(3 <= few <= many <= 64, "shapes.facets", "3 <= least <= greatest <= 64", list(self.facets))
-        small, large = (float(d) for d in readonly(self.diameter, (2,), "shapes.diameter"))
-        require(0 < small <= large < np.inf, "shapes.diameter", "0 < least <= greatest", list(self.diameter))
+        few, many = readonly(self.facets, (2,), "shapes.facets").tolist()
+        whole = few.is_integer() and many.is_integer()
+        require(
+            whole and 3 <= few <= many <= 64,
+            "shapes.facets",
+            "whole numbers 3 <= least <= greatest <= 64",
+            list(self.facets),
+        )
+        small, large = readonly(self.diameter, (2,), "shapes.diameter").tolist()
+        require(0 < small <= large, "shapes.diameter", "0 < least <= greatest", list(self.diameter))
+        object.__setattr__(self, "facets", (int(few), int(many)))
+        object.__setattr__(self, "diameter", (small, large))
         require(
             0 <= self.shortest_facet < 1, "shapes.shortest_facet", "a share in [0, 1)", self.shortest_facet
         )

@@ -10,7 +10,9 @@ import hashlib
 import io
 import json
 import os
+import struct
 import zipfile
+import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -72,11 +74,10 @@ def encode_shard(
 def decode_shard(data: bytes, source: str) -> tuple[dict[str, Any], Arrays]:
     """What the shard says about itself, and its arrays.  Raises InvalidProblem, naming `source` and field."""
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
+        arrays = _unzip(data)
         about = json.loads(str(arrays.pop("about")))
         schema = about["schema"]
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise InvalidProblem(
             source,
             expected="a whole shard (npz)",
@@ -89,6 +90,23 @@ def decode_shard(data: bytes, source: str) -> tuple[dict[str, Any], Arrays]:
         )
     _check_arrays(arrays, source)
     return about, arrays
+
+
+UNREADABLE = (
+    *(OSError, EOFError, ValueError, KeyError, TypeError, RuntimeError),
+    *(zipfile.BadZipFile, zlib.error, struct.error),
+)
+"""What reading damaged zip, npy and JSON data can raise."""
+
+
+def _unzip(data: bytes) -> Arrays:
+    """Each entry is read whole, checksum and all, before its header is believed; objects are never unpickled."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        contents = {name.removesuffix(".npy"): archive.read(name) for name in archive.namelist()}
+    return {
+        name: np.lib.format.read_array(io.BytesIO(content), allow_pickle=False)
+        for name, content in contents.items()
+    }
 
 
 def _check_arrays(arrays: Arrays, source: str) -> None:
@@ -189,9 +207,9 @@ def read_dataset(folder: str | Path) -> DataSet:
             got="an unfinished one",
             remedy="run its python -m datasets.generate command again to finish it",
         )
-    if not manifest["shards"]:
+    if not (manifest.get("shards") and manifest.get("settings")):
         raise InvalidProblem(
-            f"{folder / MANIFEST} shards", expected="at least one shard", got="an empty data set"
+            f"{folder / MANIFEST} shards", expected="settings and at least one shard", got="an empty data set"
         )
     parts = [_read_part(folder, entry) for entry in manifest["shards"]]
     return DataSet(folder, manifest, {name: _join(folder, name, parts) for name in FIELDS})

@@ -25,7 +25,7 @@ from expert.verify.plan import check_plan
 
 Contents = Callable[[Path], dict[str, bytes]]
 
-COMMAND = [sys.executable, "-m", "datasets.generate", "dataset=smoke", "dataset.count=6", "dataset.shard=2"]
+COMMAND = [sys.executable, "-m", "datasets.generate", "dataset=smoke"]
 
 
 def test_two_processes_make_the_bytes_of_one(
@@ -37,18 +37,22 @@ def test_two_processes_make_the_bytes_of_one(
 
 @pytest.mark.slow
 def test_a_job_killed_twice_ends_with_the_bytes_of_an_undisturbed_one(
-    made: Path, tmp_path: Path, contents: Contents
+    smoke: Specification, tmp_path: Path, contents: Contents
 ) -> None:
     out = tmp_path / "killed"
-    for wanted in (1, 2):  # kill as soon as so many shards are there
-        job = subprocess.Popen([*COMMAND, f"out={out}", "jobs=2"], start_new_session=True)
-        while job.poll() is None and len(list(out.glob("shards/*.npz"))) < wanted:
+    command = [*COMMAND, "dataset.count=48", "dataset.shard=2", f"out={out}", "jobs=2"]
+    for wanted in (1, 12):  # kill as soon as so many of the 24 shards are there
+        job = subprocess.Popen(command, start_new_session=True)
+        while len(list(out.glob("shards/*.npz"))) < wanted:
+            assert job.poll() is None, "ended before it could be killed"
             time.sleep(0.002)
         os.killpg(job.pid, signal.SIGKILL)
-        assert job.wait() == -signal.SIGKILL, "finished before it could be killed"
+        assert job.wait() == -signal.SIGKILL
         assert not read_manifest(out)["complete"]
-    subprocess.run([*COMMAND, f"out={out}", "jobs=2"], check=True)
-    assert contents(out) == contents(made)
+    subprocess.run(command, check=True)
+    undisturbed = replace(smoke, count=48, shard=2)
+    generate(Generation(specification=undisturbed, seed=0, out=tmp_path / "undisturbed", jobs=1))
+    assert contents(out) == contents(tmp_path / "undisturbed")
 
 
 @pytest.mark.slow
@@ -162,24 +166,24 @@ def test_data_sets_of_one_seed_share_no_task(smoke: Specification) -> None:
 
 
 def test_failed_draws_are_counted_by_reason(smoke: Specification, tmp_path: Path) -> None:
-    """Weak fingers on a slippery floor: many lifts have no plan, and the manifest says how many and which."""
-    weak = replace(smoke, count=3, shard=3, tasks=replace(smoke.tasks, friction=0.15, force_limit=2.0))
-    manifest = generate(Generation(specification=weak, seed=0, out=tmp_path / "weak", jobs=1))
+    """Hardly any friction: not every lift has a plan, and the manifest says how many have none and which."""
+    slippery = replace(smoke, count=4, shard=4, tasks=replace(smoke.tasks, friction=0.05))
+    manifest = generate(Generation(specification=slippery, seed=0, out=tmp_path / "slippery", jobs=1))
     failed = manifest["failed_draws"]
     assert manifest["failures"].get("infeasible", 0) > 0
-    assert manifest["draws"] == manifest["tasks"] + len(failed) == 3 + sum(manifest["failures"].values())
+    assert manifest["draws"] == manifest["tasks"] + len(failed) == 4 + sum(manifest["failures"].values())
     assert "unsound" not in manifest["failures"]
-    data = read_dataset(tmp_path / "weak")
-    for i in range(3):
+    data = read_dataset(tmp_path / "slippery")
+    for i in range(4):
         assert data[i].attempt == sum(f["index"] == i for f in failed)
-    again, failures = draw(weak, 0, failed[0]["index"])
+    again, failures = draw(slippery, 0, failed[0]["index"])
     assert [vars(f) for f in failures] == [f for f in failed if f["index"] == again.index]
 
 
 def test_a_task_that_no_draw_can_label_stops_the_job(smoke: Specification) -> None:
-    hopeless = replace(smoke, tasks=replace(smoke.tasks, friction=0.01, least_push=0.0))
+    one_finger = replace(smoke, tasks=replace(smoke.tasks, fingers=1))
     with pytest.raises(SolverFailed, match=r"^task 2 \(lift\): no label in 100 draws; the last: infeasible"):
-        draw(hopeless, 0, 2)
+        draw(one_finger, 0, 2)
 
 
 def test_a_spent_budget_is_no_proof_of_infeasibility() -> None:

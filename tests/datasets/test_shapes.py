@@ -70,6 +70,8 @@ def test_at_a_stable_angle_two_vertices_lie_lowest_on_either_side_of_the_weight(
     [
         ({"facets": (2, 4)}, "shapes.facets"),
         ({"facets": (6, 4)}, "shapes.facets"),
+        ({"facets": (4.5, 6)}, "shapes.facets"),
+        ({"facets": "many"}, "shapes.facets"),
         ({"diameter": (0.1, 0.05)}, "shapes.diameter"),
         ({"diameter": (0.0, 0.05)}, "shapes.diameter"),
         ({"diameter": (0.05, float("nan"))}, "shapes.diameter"),
