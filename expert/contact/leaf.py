@@ -30,6 +30,8 @@ THETA_RIDGE = 1e-8
 """Curvature of the variables that stand for the steps' costs; the bound is recomputed without it."""
 WORTH = 0.3
 """Share of the gap that a new cut must promise to close; below, the chords are too coarse and the box is split."""
+NEARBY = 1e-5
+"""Where a step has no balance, the cost within this distance of rho gives a second cut: forces grow huge before they fail."""
 
 
 class Relaxed(NamedTuple):
@@ -108,7 +110,7 @@ def open_master(
     """The program without cuts."""
     T, n = len(sequence.modes), sequence.size
     rows, side = standing_rows(model, sequence, lo, hi, assigned, n + T)
-    most = side.size + T * (rounds + 1)
+    most = side.size + T * (2 * rounds + 1)
     A, b, step = np.zeros((most, n + T)), np.zeros(most), np.full(most, -1)
     A[: side.size], b[: side.size] = rows, side
     H, g = np.zeros((n + T, n + T)), np.ones(n + T)
@@ -223,6 +225,10 @@ def evaluate(
             if missing == 0.0:
                 error[:] = 0.0
             missing += shortfall(model, t, sequence.facet[on], rho, rho, y)
+            low, high = np.maximum(rho - NEARBY, lo[on]), np.minimum(rho + NEARBY, hi[on])
+            near, _, _, around, _ = solve_step(model, t, sequence.facet[on], low, high)
+            if near == SOLVED:
+                add_cut(model, sequence, master, t, lo, hi, around, False, z, scratch)
         add_cut(
             model, sequence, master, t, lo, hi, y, proof, z, error if proof or missing == 0.0 else scratch
         )

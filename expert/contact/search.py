@@ -219,8 +219,9 @@ class Search:
                 yield max(bound, apart), Leaf(leaf.sequence, leaf.lo, leaf.hi, assigned, narrowed=True)
             return
         width = leaf.hi - leaf.lo
-        error = np.where(width > NARROWEST, np.maximum(found.chord_error, 0) + 1e-12 * width, -1)
-        if not len(width) or error.max() < 0:
+        exact = found.chord_error.max(initial=0.0) <= 1e-6 * abs(found.bound)  # then the widest is split
+        error = np.where(width > NARROWEST, width if exact else found.chord_error, -np.inf)
+        if error.max(initial=-np.inf) <= 0:
             self.pruned = min(self.pruned, bound)  # too narrow to split: it stays open
             return
         k = int(error.argmax())
