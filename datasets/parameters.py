@@ -5,9 +5,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from expert.contact.model import region_rows, rho_limits, wall_rows
 from expert.errors import InvalidProblem
-from expert.geometry.convex import Region, free_regions
-from expert.geometry.pose import Array, rotation
+from expert.geometry.pose import Array
 from expert.mechanics import ExternalContact, external_contacts, friction_rays, inertial_wrench
 from expert.types import FREE, ContactTask, IntArray, Plan, require
 
@@ -100,7 +100,7 @@ def parameters_of(task: ContactTask, plan: Plan, *, rows: int = REGION_ROWS) -> 
     return MechanicalParameters(
         poses=task.trajectory.poses,
         wrench=inertial_wrench(task),
-        facets=_open_segments(task, facet, plan),
+        facets=_open_segments(task, facet, plan.modes),
         cones=_finger_cones(task, facet),
         contact=touching,
         stick=sticking(plan.modes),
@@ -153,33 +153,17 @@ def intervals(mode: IntArray) -> list[slice]:
     return [slice(a, b) for a, b in itertools.pairwise(bounds)]
 
 
-def _open_segments(task: ContactTask, facet: IntArray, plan: Plan) -> Array:
-    """Facets (T, C, 2, 2) less the margin and the part too near to a wall, the latter over whole contact intervals."""
-    a, b = task.body.facets_w(task.trajectory.poses)  # (T, V, 2)
-    steps = np.arange(task.steps)
-    segments = np.empty((*facet.shape, 2, 2))
-    for c, mode in enumerate(plan.modes.T):
-        start, stop = a[steps, facet[:, c]], b[steps, facet[:, c]]
+def _open_segments(task: ContactTask, facet: IntArray, modes: IntArray) -> Array:
+    """Facets (T, C, 2, 2) less what margin and walls close; in a contact interval, what any of its steps closes."""
+    ends = task.body.facets_w(task.trajectory.poses)  # each (T, V, 2)
+    a, b = (np.take_along_axis(x, facet[..., None], axis=1) for x in ends)
+    low, high = (np.take_along_axis(x, facet, axis=1) for x in rho_limits(task, *ends))
+    free = modes == FREE
+    low[free], high[free] = task.fingers.facet_margin, 1 - task.fingers.facet_margin
+    for c, mode in enumerate(modes.T):
         for run in intervals(mode):
-            margin = task.fingers.facet_margin
-            low, high = margin, 1 - margin
-            if mode[run.start] != FREE:
-                low, high = _clear_of_walls(task, start[run], stop[run], low, high)
-            segments[run, c, 0] = start[run] + low * (stop - start)[run]
-            segments[run, c, 1] = start[run] + high * (stop - start)[run]
-    return segments
-
-
-def _clear_of_walls(task: ContactTask, a: Array, b: Array, low: float, high: float) -> tuple[float, float]:
-    """Largest part of [low, high] where a + rho (b - a) keeps the clearance from every wall at every step."""
-    for wall in task.environment.walls:
-        for gap_a, gap_b in zip(wall.gap(a), wall.gap(b), strict=True):
-            room, slope = task.fingers.clearance - gap_a, gap_b - gap_a  # rho slope >= room
-            if slope > 0:
-                low = max(low, room / slope)
-            elif slope < 0:
-                high = min(high, room / slope)
-    return low, max(low, high)
+            low[run, c], high[run, c] = low[run, c].max(), high[run, c].min()
+    return np.stack([a + rho[..., None] * (b - a) for rho in (low, high)], axis=2)
 
 
 def _finger_cones(task: ContactTask, facet: IntArray) -> Array:
@@ -189,29 +173,25 @@ def _finger_cones(task: ContactTask, facet: IntArray) -> Array:
 
 
 def _free_rows(task: ContactTask, plan: Plan, rows: int) -> tuple[Array, Array]:
-    """Half-planes (T, C, rows, 2), (T, C, rows) of each free finger: the object's free region it is in, and the walls."""
+    """Half-planes (T, C, rows, 2), (T, C, rows) of each free finger: the free region it is in, and the walls."""
     normals = np.zeros((*plan.modes.shape, rows, 2))
     offsets = np.full((*plan.modes.shape, rows), NO_ROW)
-    regions = free_regions(task.body.vertices, task.robustness.free_clearance)
+    regions, walls = region_rows(task), -wall_rows(task)  # n . x >= d as -n . x <= -d
     for t, c in np.argwhere(plan.modes == FREE):
-        region = _region_of(task, regions, int(t), plan.positions[t, c])
-        walls = [(-w.normal, -(w.normal @ w.point) - task.fingers.clearance) for w in task.environment.walls]
-        A = np.vstack([region.A, *(n for n, _ in walls)])
-        b = np.concatenate([region.b, [o for _, o in walls]])
-        if len(b) > rows:
+        sides = np.concatenate([_region_of(regions[t], plan.positions[t, c]), walls])
+        if len(sides) > rows:
             raise InvalidProblem(
-                "rows", expected=f"at least {len(b)} for a free finger at step {t}", got=str(rows)
+                "rows", expected=f"at least {len(sides)} for the free finger {c} at step {t}", got=str(rows)
             )
-        normals[t, c, : len(b)], offsets[t, c, : len(b)] = A, b
+        normals[t, c, : len(sides)], offsets[t, c, : len(sides)] = sides[:, :2], sides[:, 2]
     return normals, offsets
 
 
-def _region_of(task: ContactTask, regions: list[Region], t: int, position: Array) -> Region:
-    """The free region that holds the position most deeply, drawn in by the clearance, in the world frame at step t."""
-    pose = task.trajectory.poses[t]
-    turn = rotation(pose[2])
-    in_world = [Region(r.A @ turn.T, r.b + r.A @ turn.T @ pose[:2]) for r in regions]
-    return max(in_world, key=lambda r: float((r.b - r.A @ position).min()))
+def _region_of(regions: Array, position: Array) -> Array:
+    """Rows (h, 3) of the region, among (R, H, 3), with most room around the position: the one that the expert settles on."""
+    room = (regions[..., 2] - regions[..., :2] @ position).min(axis=1)
+    region = regions[room.argmax()]
+    return region[region[:, :2].any(axis=1)]
 
 
 def _external(task: ContactTask) -> tuple[Array, Array, Array]:

@@ -113,7 +113,7 @@ def cost(x: Variables, P: Parameters, w: QPWeights) -> cp.Expression:
         (w.hold, _weigh(P["contact"], x.away)),
         (w.hold, cp.multiply(P["sticks"], x.slip)),
         (w.filler, _weigh(P["idle"], x.alpha)),
-        (w.filler, _weigh(P["absent"], x.beta)),
+        (w.filler, _weigh(P["absent"], x.beta - 0.5)),
         (w.filler, cp.multiply(P["free"], x.rho - 0.5)),
         (w.anchor, x.p - P["anchor"]),
         (w.ridge, x.beta),
@@ -139,5 +139,5 @@ def _dot(u: cp.Expression, v: cp.Expression) -> cp.Expression:
     return cp.multiply(u[:, :, 0], v[:, :, 0]) + cp.multiply(u[:, :, 1], v[:, :, 1])
 
 
-def _weigh(flag: cp.Parameter, vectors: cp.Variable) -> cp.Expression:
+def _weigh(flag: cp.Parameter, vectors: cp.Expression) -> cp.Expression:
     return cp.stack([cp.multiply(flag, vectors[:, :, d]) for d in (0, 1)], axis=2)
