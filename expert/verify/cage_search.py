@@ -20,8 +20,8 @@ Node = tuple[Cell, int]
 Verdict = Literal["caged", "escapes", "unknown"]
 UNIT = 2 * np.pi / TURN
 """[rad]."""
-PATIENCE = 60
-"""After so many rounds the doubt is a long narrow corridor: cells are then split to an eighth at once."""
+MOST_ROUNDS, PATIENCE = 300, 40
+"""Refinements before giving up; after PATIENCE of them the doubt is a long corridor, and cells are split to an eighth."""
 
 
 class CageSearch:
@@ -42,7 +42,7 @@ class CageSearch:
     def run(self, range_resolution: float, cell_budget: int) -> tuple[Verdict, Array]:
         """Refine until a flood of the inner components stays bounded or one of the outer components escapes."""
         nowhere = np.empty((0, 3))
-        for turn in itertools.count():
+        for turn in range(MOST_ROUNDS):
             if self.complex.evaluated >= cell_budget:
                 break
             route = self.candidate_escape()

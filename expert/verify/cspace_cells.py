@@ -131,7 +131,7 @@ class CellComplex:
     @property
     def evaluated(self) -> int:
         """How many cells were looked at."""
-        return len(self._inner)
+        return len(self._inner.keys() | self._outer.keys())
 
     def inner(self, cell: Cell) -> Components:
         """Components outside the inner obstacles: every free configuration of the cell is in one of them."""
