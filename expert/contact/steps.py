@@ -14,7 +14,7 @@ from expert.contact.qp import FAILED, INFEASIBLE, SOLVED, solve_qp
 from expert.geometry.pose import Array
 from expert.types import IntArray
 
-RIDGE = 1e-7
+RIDGE = 1e-9
 """Curvature given to reactions and to doubly described forces, in units of 1 / (m g)^2: reactions cost nothing."""
 CERTAIN = 1e-9
 """An infeasible step must miss its required wrench by this much [m g, m g L] for multipliers of length one."""
