@@ -3,7 +3,7 @@ BIN := .venv/bin
 # `make demo EXPERIMENT=smoke` goes through the same steps on 6 tasks and 2 iterations, in a minute.
 EXPERIMENT ?= thesis
 
-.PHONY: setup demo report test lint bench clean
+.PHONY: setup demo report test lint bench gallery clean
 setup: .venv/installed
 
 .venv/installed: pyproject.toml
@@ -35,6 +35,16 @@ bench: setup
 	@status=0; for file in tests/benchmarks/[a-z]*.py; do \
 		name=$$(basename $$file .py); echo "== $$name"; \
 		$(BIN)/python -m tests.benchmarks.$$name $(BENCH) || status=1; done; exit $$status
+
+# Pictures of docs/gallery.md: solve, check and draw every contact-trajectory problem that has a plan.
+gallery: setup
+	@mkdir -p build docs/gallery
+	@for file in configs/problem/contact_trajectory/*.yaml; do \
+		name=$$(basename $$file .yaml); echo "== $$name"; \
+		$(BIN)/python -m expert solve $$file -o build/$$name.json || continue; \
+		$(BIN)/python -m expert verify build/$$name.json -o build/$$name.certificate.json || exit 1; \
+		for ending in png gif; do $(BIN)/python -m expert draw build/$$name.json -o docs/gallery/$$name.$$ending; done; \
+	done
 
 clean:
 	rm -rf .venv .mypy_cache .pytest_cache .ruff_cache .import_linter_cache *.egg-info
