@@ -16,32 +16,43 @@ from dlm.simulator.settings import Layers, Physics
 from dlm.simulator.step import (
     CORRECTION,
     FASTEST_CORRECTION,
+    SHALLOW,
     SUPPORT_CREEP,
     Work,
     assemble_problem,
+    bias,
     finger_mobility,
     scale,
     softness,
     solve_step,
+    support_directions,
     support_mobility,
+    vertex_arm,
     work_for,
 )
+
+
+TOUCHING = 1e-12
+"""Plans start with fingers that touch: there smoothed contacts have a kink, and the mean of both slopes is taken [m]."""
 
 
 @njit(cache=True)
 def softness_slope(gap: float, physics: Physics) -> float:
     """Derivative of `softness` with respect to the gap: (1 - a) / a = (exp(kappa gap) - 1) / 2 where the gap is open."""
-    if np.isinf(physics.kappa) or gap <= 0 or physics.kappa * gap > 500:
+    if np.isinf(physics.kappa) or gap < -TOUCHING or physics.kappa * gap > 500:
         return 0.0
-    return 0.5 * physics.kappa * np.exp(physics.kappa * gap)
+    slope = 0.5 * physics.kappa * np.exp(physics.kappa * gap)
+    return slope if gap > TOUCHING else slope / 2
 
 
 @njit(cache=True)
 def bias_slope(gap: float, h: float, physics: Physics) -> float:
     """Derivative of `bias` with respect to the gap."""
-    if gap < 0:
-        return CORRECTION / h if CORRECTION * gap / h > -FASTEST_CORRECTION else 0.0
-    return 1 / h if np.isinf(physics.kappa) else 0.0
+    if gap < -SHALLOW:
+        return CORRECTION / h if bias(gap, h, physics) > -FASTEST_CORRECTION else 0.0
+    if np.isinf(physics.kappa) or gap < -TOUCHING:
+        return 1 / h
+    return 0.0 if gap > TOUCHING else 0.5 / h
 
 
 @njit(cache=True)
@@ -94,7 +105,8 @@ def adjoint_step(
     n, _ = solve_step(scene, physics, q, v, p, u, work)
     if scene.support > 0:
         guess = work.velocity.copy()
-        support_mobility(scene, physics, q, v, guess, True, work)
+        friction = support_directions(scene, q, guess)
+        support_mobility(scene, physics, q, v, guess, friction, work)
         assemble_problem(n, scene, physics, work)
     give = finger_mobility(scene, physics)
     J, D, W, finger = work.rows, work.directions, work.mobility, work.contacts.finger
@@ -192,8 +204,7 @@ def _adjoint_geometry(
     contacts = work.contacts
     k, f = contacts.feature[i], contacts.finger[i]
     cs, sn = np.cos(q[2]), np.sin(q[2])
-    rx = cs * scene.vertices[k, 0] - sn * scene.vertices[k, 1]
-    ry = sn * scene.vertices[k, 0] + cs * scene.vertices[k, 1]
+    rx, ry = vertex_arm(scene, k, cs, sn)
     if contacts.kind[i] == WALL:
         gx, gy = c_bar[0] + gap_bar * contacts.normal[i, 0], c_bar[1] + gap_bar * contacts.normal[i, 1]
         _to_pose(gx, gy, rx, ry, q_bar)
@@ -235,8 +246,7 @@ def _adjoint_support(scene: View, physics: Physics, q: np.ndarray, z: np.ndarray
     cs, sn = np.cos(q[2]), np.sin(q[2])
     total = 0.0
     for k in range(len(scene.vertices)):
-        rx = cs * scene.vertices[k, 0] - sn * scene.vertices[k, 1]
-        ry = sn * scene.vertices[k, 0] + cs * scene.vertices[k, 1]
+        rx, ry = vertex_arm(scene, k, cs, sn)
         sx, sy = v[0] - v[2] * ry, v[1] + v[2] * rx
         speed = np.sqrt(sx * sx + sy * sy + SUPPORT_CREEP**2)
         viscous = h * scene.support / speed

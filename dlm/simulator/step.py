@@ -16,11 +16,13 @@ from dlm.simulator.contact import WALL_POINTS, Contacts, View, activation, colle
 from dlm.simulator.lcp import Complementarity, complementarity_for, solve_contacts
 from dlm.simulator.settings import Physics
 
+SHALLOW = 1e-5
+"""Penetrations up to here are removed within a step, like gaps: contacts that carry load have no kink about zero [m]."""
 CORRECTION, FASTEST_CORRECTION = 0.2, 0.5
-"""Share of a penetration that one step removes, and the greatest speed at which [m/s]."""
+"""Share of a deeper penetration that one step removes, and the greatest speed at which [m/s]."""
 SUPPORT_CREEP = 1e-5
 """Support friction is Coulomb's above this speed and viscous below it [m/s]."""
-SUPPORT_ITERATIONS, SUPPORT_TOLERANCE = 60, 1e-12
+SUPPORT_ITERATIONS, SUPPORT_TOLERANCE = 60, 1e-13
 
 
 class Work(NamedTuple):
@@ -115,9 +117,9 @@ def softness(gap: float, physics: Physics) -> float:
 @njit(cache=True)
 def bias(gap: float, h: float, physics: Physics) -> float:
     """Velocity that the normal row adds: what closes an open gap, or what removes a share of a penetration."""
-    if gap < 0:
-        return max(CORRECTION * gap / h, -FASTEST_CORRECTION)
-    return gap / h if np.isinf(physics.kappa) else 0.0
+    if gap < -SHALLOW:
+        return max((CORRECTION * (gap + SHALLOW) - SHALLOW) / h, -FASTEST_CORRECTION)
+    return gap / h if gap < 0 or np.isinf(physics.kappa) else 0.0
 
 
 @njit(cache=True)
@@ -187,61 +189,75 @@ def apply_impulses(n: int, scene: View, physics: Physics, work: Work) -> None:
 
 @njit(cache=True)
 def _with_support(n: int, scene: View, physics: Physics, q: np.ndarray, v: np.ndarray, work: Work) -> bool:
-    """Contacts and support friction together: friction as a viscous law, re-linearised until the velocity stands still.
+    """Contacts and support friction together, by Newton steps in velocity and friction (Chan, Golub, Mulet).
 
-    Secant (Kacanov) steps always converge, slowly; Newton steps finish the job and are kept only while they shrink.
+    Every vertex, at velocity s, takes the friction -F w with w = s / sqrt(|s|^2 + creep^2).  Keeping w as an unknown of
+    its own, within the unit disc, lets Newton's method converge from afar.
     """
     guess = work.predicted.copy()
-    exact, last, newton = True, np.inf, False
-    for k in range(SUPPORT_ITERATIONS):
-        support_mobility(scene, physics, q, v, guess, newton, work)
+    friction = support_directions(scene, q, guess)
+    exact = True
+    for _ in range(SUPPORT_ITERATIONS):
+        support_mobility(scene, physics, q, v, guess, friction, work)
         exact = _velocities(n, scene, physics, work)
-        change = 0.0
-        for j, unit in ((0, 1.0), (1, 1.0), (2, scene.length[0])):
-            change = max(change, unit * abs(work.velocity[j] - guess[j]))
+        change = _update_directions(scene, q, guess, work.velocity, friction)
         guess[:] = work.velocity
         if change < SUPPORT_TOLERANCE:
             return exact
-        newton = k >= 3 and (change < last or not newton)
-        last = change
-    return exact
+    return False
+
+
+@njit(cache=True, inline="always")
+def vertex_arm(scene: View, k: int, cs: float, sn: float) -> tuple[float, float]:
+    """Vertex k seen from the centre of mass, world frame, for cosine and sine of the object's angle."""
+    x, y = scene.vertices[k, 0], scene.vertices[k, 1]
+    return cs * x - sn * y, sn * x + cs * y
+
+
+@njit(cache=True)
+def support_directions(scene: View, q: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    """Directions w (V, 2) that the support friction opposes."""
+    w = np.zeros((len(scene.vertices), 2))
+    cs, sn = np.cos(q[2]), np.sin(q[2])
+    for k in range(len(w)):
+        rx, ry = vertex_arm(scene, k, cs, sn)
+        sx, sy = velocity[0] - ry * velocity[2], velocity[1] + rx * velocity[2]
+        speed = np.sqrt(sx * sx + sy * sy + SUPPORT_CREEP**2)
+        w[k, 0], w[k, 1] = sx / speed, sy / speed
+    return w
 
 
 @njit(cache=True)
 def support_mobility(
-    scene: View, physics: Physics, q: np.ndarray, v: np.ndarray, guess: np.ndarray, newton: bool, work: Work
+    scene: View,
+    physics: Physics,
+    q: np.ndarray,
+    v: np.ndarray,
+    guess: np.ndarray,
+    friction: np.ndarray,
+    work: Work,
 ) -> None:
-    """Mobility and contact-free velocity with the support friction linearised at the velocity `guess`.
-
-    Every vertex takes f = -F s / sqrt(|s|^2 + creep^2) at its velocity s.
-    """
+    """Mobility and contact-free velocity with the support friction linearised at a velocity and its directions w."""
     h = scene.dt / physics.substeps
-    K = np.zeros((3, 3))
-    b = np.zeros(3)
+    K, b, S, D = np.zeros((3, 3)), np.zeros(3), np.zeros((2, 3)), np.zeros((2, 2))
     K[0, 0] = K[1, 1] = scene.mass
     K[2, 2] = scene.inertia
     b[0], b[1], b[2] = scene.mass * v[0], scene.mass * v[1], scene.inertia * v[2]
     cs, sn = np.cos(q[2]), np.sin(q[2])
-    S = np.zeros((2, 3))
     S[0, 0] = S[1, 1] = 1
-    D = np.zeros((2, 2))
     for k in range(len(scene.vertices)):
-        S[0, 2] = -(sn * scene.vertices[k, 0] + cs * scene.vertices[k, 1])
-        S[1, 2] = cs * scene.vertices[k, 0] - sn * scene.vertices[k, 1]
-        sx, sy = guess[0] + S[0, 2] * guess[2], guess[1] + S[1, 2] * guess[2]
+        rx, ry = vertex_arm(scene, k, cs, sn)
+        S[0, 2], S[1, 2] = -ry, rx
+        sx, sy = guess[0] - ry * guess[2], guess[1] + rx * guess[2]
         speed = np.sqrt(sx * sx + sy * sy + SUPPORT_CREEP**2)
         viscous = h * scene.support / speed
-        D[0, 0] = D[1, 1] = viscous
-        D[0, 1] = D[1, 0] = 0.0
-        if newton:
-            cubic = viscous / (speed * speed)
-            D[0, 0] -= cubic * sx * sx
-            D[0, 1] -= cubic * sx * sy
-            D[1, 0] -= cubic * sx * sy
-            D[1, 1] -= cubic * sy * sy
-        rx, ry = D[0, 0] * sx + D[0, 1] * sy - viscous * sx, D[1, 0] * sx + D[1, 1] * sy - viscous * sy
+        wx, wy = friction[k, 0], friction[k, 1]
+        D[0, 0], D[1, 1] = viscous * (1 - wx * sx / speed), viscous * (1 - wy * sy / speed)
+        D[0, 1] = D[1, 0] = -0.5 * viscous * (wx * sy + wy * sx) / speed
+        fx = (D[0, 0] - viscous) * sx + D[0, 1] * sy
+        fy = D[1, 0] * sx + (D[1, 1] - viscous) * sy
         for i in range(3):
-            b[i] += S[0, i] * rx + S[1, i] * ry
+            b[i] += S[0, i] * fx + S[1, i] * fy
             for j in range(3):
                 for d in range(2):
                     for e in range(2):
@@ -249,6 +265,28 @@ def support_mobility(
     invert(K, work.mobility)
     for i in range(3):
         work.free[i] = work.mobility[i, 0] * b[0] + work.mobility[i, 1] * b[1] + work.mobility[i, 2] * b[2]
+
+
+@njit(cache=True)
+def _update_directions(
+    scene: View, q: np.ndarray, before: np.ndarray, after: np.ndarray, friction: np.ndarray
+) -> float:
+    """Newton step of the directions w, drawn back into the unit disc; returns the largest change of a vertex velocity."""
+    cs, sn = np.cos(q[2]), np.sin(q[2])
+    largest = 0.0
+    for k in range(len(friction)):
+        rx, ry = vertex_arm(scene, k, cs, sn)
+        sx, sy = before[0] - ry * before[2], before[1] + rx * before[2]
+        dx = after[0] - ry * after[2] - sx
+        dy = after[1] + rx * after[2] - sy
+        speed = np.sqrt(sx * sx + sy * sy + SUPPORT_CREEP**2)
+        along = (sx * dx + sy * dy) / speed
+        wx = (sx + dx - friction[k, 0] * along) / speed
+        wy = (sy + dy - friction[k, 1] * along) / speed
+        length = max(1.0, np.sqrt(wx * wx + wy * wy))
+        friction[k, 0], friction[k, 1] = wx / length, wy / length
+        largest = max(largest, abs(dx), abs(dy))
+    return largest
 
 
 @njit(cache=True)
