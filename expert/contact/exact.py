@@ -9,7 +9,7 @@ import time
 import numpy as np
 
 from expert.contact.model import Model, model_of
-from expert.contact.plan_at import finger_forces, positions_at
+from expert.contact.plan_at import all_forces, positions_at
 from expert.contact.polish import polish as polished
 from expert.contact.reasons import why_infeasible
 from expert.contact.recovery import plan_cost, wrench_residual
@@ -18,7 +18,6 @@ from expert.errors import SolverFailed
 from expert.geometry.pose import Array
 from expert.types import ContactTask, Plan, Status
 
-POLISH_ROUNDS = 60
 RESIDUAL = 1e-8
 """Largest Newton-Euler residual of a plan that is handed out, over m g and m g L."""
 
@@ -53,7 +52,7 @@ def solve(
         )
     z = outcome.best.z
     if polish:
-        z, _, _ = polished(model, outcome.best.sequence, z, POLISH_ROUNDS)
+        z = polished(model, outcome.best.sequence, z).z
     return _plan(task, model, outcome, z, gap, start)
 
 
@@ -70,7 +69,7 @@ def _plan(task: ContactTask, model: Model, outcome: Outcome, z: Array, gap: floa
     if sequence is None:
         raise SolverFailed("no contact sequence to recover a plan from")
     positions = positions_at(task, model, sequence, z)
-    forces, reactions = finger_forces(task, model, sequence, z)
+    forces, reactions = all_forces(task, model, sequence, z)
     residual = wrench_residual(task, positions, forces, reactions)
     if not residual <= RESIDUAL:
         raise SolverFailed(f"the best plan misses Newton-Euler by {residual:.2g} of the object's weight")

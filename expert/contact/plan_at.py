@@ -1,4 +1,4 @@
-"""From contact modes and positions to a Plan: forces by one exact program per step, figures from the plan itself."""
+"""From contact modes and positions to forces and a plan's arrays: one exact program per step at fixed positions."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from expert.contact.leaf import pushes
 from expert.contact.model import Model
 from expert.contact.qp import SOLVED
 from expert.contact.sequence import Sequence, smoothing
-from expert.contact.steps import solve_step, step_program
+from expert.contact.steps import rays_per_end, solve_step
 from expert.errors import SolverFailed
 from expert.geometry.pose import Array
 from expert.mechanics import external_contacts
@@ -17,42 +17,30 @@ from expert.types import SUPPORT, ContactForce, ContactTask
 
 
 class Forces(NamedTuple):
-    """At fixed positions: cost of the whole plan (inf: none), forces (T, C, 2) [m g], normal forces (T, K) by contact
-    interval, ray weights (T, E) of reactions."""
+    """Least-cost forces at fixed positions: cost of the whole plan (inf: none) and ray weights (T, N) [m g].
+
+    Rays of a step: those of each pushing finger in turn (cone edges n + mu tau, n - mu tau, and n if a margin is
+    rewarded), then the environment's.
+    """
 
     cost: float
-    fingers: Array
-    normal: Array
-    reactions: Array
+    weights: Array
 
 
 @njit(cache=True)
 def forces_at(model: Model, sequence: Sequence, z: Array) -> Forces:
-    """Least-cost forces for contact positions z; exact torque, since positions are fixed."""
+    """Exact torque: with positions fixed, the wrench balance is linear."""
     T, C = sequence.modes.shape
-    fingers, reactions = np.zeros((T, C, 2)), np.zeros(model.group.shape)
-    normal = np.zeros((T, sequence.lo.size))
+    weights = np.zeros((T, 3 * C + model.rays.shape[1]))
     total = smoothing(sequence, z)
     for t in range(T):
         on = pushes(sequence, t)
         status, cost, _, _, x = solve_step(model, t, sequence.facet[on], z[on], z[on])
         if status != SOLVED:
-            return Forces(np.inf, fingers, normal, reactions)
+            return Forces(np.inf, weights)
         total += cost
-        _, _, _, _, force = step_program(model, t, sequence.facet[on], z[on], z[on])
-        k = 0
-        each = 3 if model.margin_weight > 0 else 2
-        for c in range(C):
-            if (on == sequence.interval[t, c]).any():
-                for _ in range(each):
-                    weight = max(x[k], 0.0)
-                    normal[t, sequence.interval[t, c]] += weight
-                    fingers[t, c, 0] += weight * force[0, k]
-                    fingers[t, c, 1] += weight * force[1, k]
-                    k += 1
-        for e in range(x.size - k):
-            reactions[t, e] = max(x[k + e], 0.0)
-    return Forces(total, fingers, normal, reactions)
+        weights[t, : x.size] = np.maximum(x, 0.0)
+    return Forces(total, weights)
 
 
 def positions_at(task: ContactTask, model: Model, sequence: Sequence, z: Array) -> Array:
@@ -60,31 +48,41 @@ def positions_at(task: ContactTask, model: Model, sequence: Sequence, z: Array) 
     return model.origin + task.body.size * (sequence.offset + sequence.map @ z)
 
 
-def finger_forces(
+def all_forces(
     task: ContactTask, model: Model, sequence: Sequence, z: Array
 ) -> tuple[Array, tuple[ContactForce, ...]]:
-    """Forces (T, C, 2) [N] on the object, and what the environment exerts.  Raises SolverFailed."""
-    forces = forces_at(model, sequence, z)
-    if not np.isfinite(forces.cost):
+    """Finger forces (T, C, 2) [N, on the object] and what the environment exerts.  Raises SolverFailed."""
+    found = forces_at(model, sequence, z)
+    if not np.isfinite(found.cost):
         raise SolverFailed("the forces of a plan could not be computed again at its contact positions")
-    used = [0] * task.steps
-    reactions = []
+    fingers, reactions = np.zeros((*sequence.modes.shape, 2)), []
+    each = rays_per_end(model)
+    slopes = model.friction * np.array([1.0, -1.0, 0.0][:each])
+    for t, weights in enumerate(task.weight * found.weights):
+        on = pushes(sequence, t)
+        for i, k in enumerate(on):
+            f, share = sequence.facet[k], weights[each * i : each * (i + 1)]
+            c = int(np.flatnonzero(sequence.interval[t] == k)[0])
+            fingers[t, c] = share.sum() * model.normal[t, f] + (share @ slopes) * model.tangent[t, f]
+        reactions += _environment(task, t, weights[each * len(on) :])
+    return fingers, tuple(reactions)
+
+
+def _environment(task: ContactTask, t: int, weights: Array) -> list[ContactForce]:
+    """Contact forces at step t from the weights [N] of the free rays, and those that sliding on the support fixes."""
+    reactions, used = [], 0
     for contact in external_contacts(task):
-        if contact.fixed:
-            force = contact.rays[0]
-        else:
-            first = used[contact.step]
-            used[contact.step] += len(contact.rays)
-            unit = 1.0 if contact.wall == SUPPORT else task.weight
-            force = unit * forces.reactions[contact.step, first : used[contact.step]] @ contact.rays
+        if contact.step != t:
+            continue
+        force = contact.rays[0]
+        if not contact.fixed:
+            share = weights[used : used + len(contact.rays)]
+            used += len(contact.rays)
+            force = share @ contact.rays / (task.weight if contact.wall == SUPPORT else 1.0)
         if force.any():
             reactions.append(
                 ContactForce(
-                    step=contact.step,
-                    vertex=contact.vertex,
-                    wall=contact.wall,
-                    point=contact.point,
-                    force=force,
+                    step=t, vertex=contact.vertex, wall=contact.wall, point=contact.point, force=force
                 )
             )
-    return task.weight * forces.fingers, tuple(reactions)
+    return reactions

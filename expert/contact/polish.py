@@ -2,8 +2,12 @@
 
 Successive convex programs with the torque to first order, (p0 - q) x lambda + (p - p0) x lambda0; forces are recomputed
 exactly at the new positions and steps are halved until the true cost falls.  Any Karush-Kuhn-Tucker point of the task at
-fixed modes is a fixed point, and the minimiser of its own convex program.
+fixed modes is a fixed point, and the minimiser of its own convex program.  Where these programs zigzag, because they do
+not see the curvature of the torque, Newton's method on the active constraints finishes.
 """
+
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -13,7 +17,7 @@ from expert.contact.model import Model
 from expert.contact.plan_at import forces_at
 from expert.contact.qp import SOLVED, solve_qp
 from expert.contact.sequence import Sequence, nearest_region, standing_rows
-from expert.contact.steps import step_program
+from expert.contact.steps import RIDGE, rays_per_end, step_program
 from expert.geometry.pose import Array
 from expert.types import IntArray
 
@@ -21,6 +25,80 @@ STATIONARY = 1e-9
 """A plan is stationary when its own convex program moves no variable by more (rho, and lengths in L)."""
 PROXIMAL = 1e-6
 """Curvature, relative to the smoothing weight, towards the current point: settles flat directions, moves no fixed point."""
+ROUNDS, PATIENCE = 60, 8
+"""Convex programs in all, and before Newton's method is tried."""
+
+
+class Program(NamedTuple):
+    """The convex program at a point, over z and all ray weights: min v'Hv/2 + g'v, A v = b (first rows), A v >= b.
+
+    first (T + 1,): where each step's ray weights start; torque (T,): row of its torque balance, -1 for none.
+    """
+
+    H: Array
+    g: Array
+    A: Array
+    b: Array
+    equalities: int
+    first: IntArray
+    torque: IntArray
+
+
+@dataclass(frozen=True)
+class Polished:
+    """z, its cost, the last convex program's move and how many were solved; stationary: move within STATIONARY."""
+
+    z: Array
+    cost: float
+    moved: float
+    rounds: int
+
+    @property
+    def stationary(self) -> bool:
+        return self.moved <= STATIONARY
+
+
+def polish(model: Model, sequence: Sequence, z: Array) -> Polished:
+    """Stationary point reached downhill from z."""
+    forces = forces_at(model, sequence, z)
+    cost, moved, rounds = forces.cost, np.inf, 0
+    while rounds < ROUNDS:
+        rounds += 1
+        program = first_order(model, sequence, z, forces.weights, settle_regions(model, sequence, z))
+        status, v, u = solve_qp(
+            program.H, program.g, program.A, program.b, program.equalities, 4 * model.iterations
+        )
+        if status != SOLVED:
+            break
+        moved = float(np.abs(v[: len(z)] - z).max(initial=0.0))
+        if moved <= STATIONARY:
+            break
+        candidates = [z + 0.5**k * (v[: len(z)] - z) for k in range(25)]
+        if rounds > PATIENCE:
+            curved = newton(
+                model, sequence, program, np.concatenate([z, *_weights(program, forces.weights)]), u
+            )
+            candidates.insert(
+                0,
+                np.concatenate(
+                    [
+                        np.clip(curved[: len(sequence.lo)], sequence.lo, sequence.hi),
+                        curved[len(sequence.lo) : len(z)],
+                    ]
+                ),
+            )
+        for trial in candidates:
+            reached = forces_at(model, sequence, trial)
+            if reached.cost <= cost + 1e-13 * abs(cost):
+                z, cost, forces = trial, reached.cost, reached
+                break
+        else:
+            break
+    return Polished(z, cost, moved, rounds)
+
+
+def _weights(program: Program, weights: Array) -> list[Array]:
+    return [weights[t, : program.first[t + 1] - program.first[t]] for t in range(len(weights))]
 
 
 @njit(cache=True)
@@ -36,82 +114,66 @@ def settle_regions(model: Model, sequence: Sequence, z: Array) -> IntArray:
 
 
 @njit(cache=True)
-def first_order_step(
-    model: Model, sequence: Sequence, z: Array, assigned: IntArray, proximal: float
-) -> tuple[bool, Array]:
-    """Minimiser z of the convex program with the torque expanded to first order at z and its exact forces."""
-    T, n = len(sequence.modes), z.size
+def first_order(model: Model, sequence: Sequence, z: Array, weights: Array, assigned: IntArray) -> Program:
+    """The convex program with the torque expanded to first order at z and its forces; both are held by a proximal term."""
+    T, n, each = len(sequence.modes), z.size, rays_per_end(model)
     standing, side = standing_rows(model, sequence, sequence.lo, sequence.hi, assigned, n)
-    normal = forces_at(model, sequence, z).normal
-    width, rows = n, side.size
+    first, torque = np.full(T + 1, n), np.full(T, -1)
+    balances, rows = 0, side.size
     for t in range(T):
         on = pushes(sequence, t)
-        _, g, _, b, _ = step_program(model, t, sequence.facet[on], z[on], z[on])
-        width += g.size
-        rows += b.size if g.size > 0 else 0
+        _, g, _, b = step_program(model, t, sequence.facet[on], z[on], z[on])
+        first[t + 1] = first[t] + g.size
+        if g.size > 0:
+            balances, rows = balances + 3, rows + b.size
+    width = first[T]
     H, g, A, b = np.zeros((width, width)), np.zeros(width), np.zeros((rows, width)), np.zeros(rows)
     H[:n, :n] = sequence.Q
-    g[:n] = sequence.q
-    weight = proximal * (1 + model.acceleration_weight)
+    proximal = PROXIMAL * (1 + model.acceleration_weight)
     for i in range(n):
-        H[i, i] += weight
-        g[i] -= weight * z[i]
-    balances = 0  # equalities come first
-    for t in range(T):
-        balances += 3 if _size(model, sequence, t) > 0 else 0
+        H[i, i] += proximal
+        g[i] = sequence.q[i] - proximal * z[i]
     A[balances : balances + side.size, :n] = standing
     b[balances : balances + side.size] = side
-    column, row, top = n, balances + side.size, 0
+    top, row = 0, balances + side.size
     for t in range(T):
         on = pushes(sequence, t)
-        h, c, a, s, _ = step_program(model, t, sequence.facet[on], z[on], z[on])
+        h, c, a, s = step_program(model, t, sequence.facet[on], z[on], z[on])
         if c.size == 0:
             continue
-        H[column : column + c.size, column : column + c.size] = h
-        g[column : column + c.size] = c
-        A[top : top + 3, column : column + c.size] = a[:3]
+        span = slice(first[t], first[t + 1])
+        H[span, span] = h
+        g[span] = c - RIDGE * weights[t, : c.size]
+        A[top : top + 3, span] = a[:3]
         b[top : top + 3] = s[:3]
-        for k in on:
-            torque = model.length[sequence.facet[k]] * normal[t, k]
-            A[top + 2, k] += torque
-            b[top + 2] += torque * z[k]
-        A[row : row + s.size - 3, column : column + c.size] = a[3:]
+        torque[t] = top + 2
+        for i in range(on.size):
+            arm = model.length[sequence.facet[on[i]]] * weights[t, each * i : each * (i + 1)].sum()
+            A[top + 2, on[i]] += arm
+            b[top + 2] += arm * z[on[i]]
+        A[row : row + s.size - 3, span] = a[3:]
         b[row : row + s.size - 3] = s[3:]
-        column, row, top = column + c.size, row + s.size - 3, top + 3
-    status, x, _ = solve_qp(H, g, A[:row], b[:row], balances, 4 * model.iterations)
-    return status == SOLVED, x[:n]
+        top, row = top + 3, row + s.size - 3
+    return Program(H, g, A, b, balances, first, torque)
 
 
-@njit(cache=True)
-def _size(model: Model, sequence: Sequence, t: int) -> int:
-    on = pushes(sequence, t)
-    empty = np.zeros(on.size)
-    _, g, _, _, _ = step_program(model, t, sequence.facet[on], empty, empty)
-    return g.size
+def newton(model: Model, sequence: Sequence, program: Program, v: Array, u: Array) -> Array:
+    """One Newton step from v on the constraints that the convex program's multipliers u find active, curved torque included."""
+    active = np.arange(len(u)) < program.equalities
+    active |= u > 1e-10 * max(1.0, np.abs(u).max(initial=0.0))
+    bent = curvature(model, sequence, program, u)
+    A = program.A[active]
+    zero = np.zeros((len(A), len(A)))
+    matrix = np.block([[program.H + bent, A.T], [A, zero]])
+    right = np.concatenate([bent @ v - program.g, program.b[active]])
+    return np.linalg.lstsq(matrix, right, rcond=1e-13)[0][: len(v)]
 
 
-@njit(cache=True)
-def polish(model: Model, sequence: Sequence, z: Array, rounds: int) -> tuple[Array, float, int]:
-    """Stationary point reached from z, the last step's length, and the number of convex programs."""
-    z = z.copy()
-    cost = forces_at(model, sequence, z).cost
-    moved, proximal = np.inf, PROXIMAL
-    for count in range(rounds):
-        assigned = settle_regions(model, sequence, z)
-        solved, target = first_order_step(model, sequence, z, assigned, proximal)
-        if not solved:
-            return z, moved, count
-        moved = np.abs(target - z).max() if z.size > 0 else 0.0
-        if moved <= STATIONARY:
-            return z, moved, count
-        step = 1.0
-        for _ in range(30):
-            trial = z + step * (target - z)
-            reached = forces_at(model, sequence, trial).cost
-            if reached <= cost + 1e-13 * abs(cost):
-                z, cost = trial, reached
-                break
-            step *= 0.5
-        else:
-            return z, moved, count
-    return z, moved, rounds
+def curvature(model: Model, sequence: Sequence, program: Program, u: Array) -> Array:
+    """Second derivative of the Lagrangian's torque terms, -u_tau l d(rho) d(lambda_n)."""
+    bent, each = np.zeros_like(program.H), rays_per_end(model)
+    for t, row in enumerate(program.torque):
+        for i, k in enumerate(pushes(sequence, t)):
+            rays = program.first[t] + np.arange(each * i, each * (i + 1))
+            bent[k, rays] -= u[row] * model.length[sequence.facet[k]]
+    return bent + bent.T

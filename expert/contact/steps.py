@@ -90,14 +90,20 @@ def shortfall(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, y: A
 
 
 @njit(cache=True)
+def rays_per_end(model: Model) -> int:
+    """Rays of a finger at one rho: both edges of its cone, and the normal where the margin is rewarded."""
+    return 3 if model.margin_weight > 0 else 2
+
+
+@njit(cache=True)
 def step_program(
     model: Model, t: int, facets: IntArray, lo: Array, hi: Array
-) -> tuple[Array, Array, Array, Array, Array]:
-    """H, g, A, b of the step's program over ray weights x >= 0, and the finger rays' forces (2, n).
+) -> tuple[Array, Array, Array, Array]:
+    """H, g, A, b of the step's program over ray weights x >= 0: the wrench balance, x >= 0, limits of force.
 
-    Rays of a finger: both cone edges (and the normal if the margin is rewarded) at lo, and at hi where that differs.
+    Rays: those of each finger at lo, and at hi where that differs; then the environment's.
     """
-    each = 3 if model.margin_weight > 0 else 2
+    each = rays_per_end(model)
     count = 0
     for i in range(facets.size):
         count += each if lo[i] == hi[i] else 2 * each
@@ -143,7 +149,7 @@ def step_program(
         H[k, k] += RIDGE
         A[3 + k, k] = 1.0
     b[:3] = model.required[t]
-    return H, g, A, b, force
+    return H, g, A, b
 
 
 @njit(cache=True)
@@ -154,7 +160,7 @@ def solve_step(
 
     INFEASIBLE only with a proof that `shortfall` confirms; FAILED leaves the bound of y = 0 and no more.
     """
-    H, g, A, b, _ = step_program(model, t, facets, lo, hi)
+    H, g, A, b = step_program(model, t, facets, lo, hi)
     y = np.zeros(3)
     if g.size == 0:
         size = np.abs(model.required[t]).max()
