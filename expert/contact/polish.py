@@ -25,8 +25,8 @@ STATIONARY = 1e-9
 """A plan is stationary when its own convex program moves no variable by more (rho, and lengths in L)."""
 PROXIMAL = 1e-6
 """Curvature, relative to the smoothing weight, towards the current point: settles flat directions, moves no fixed point."""
-ROUNDS, PATIENCE = 60, 8
-"""Convex programs in all, and before Newton's method is tried."""
+ROUNDS, PATIENCE, HALVINGS = 60, 8, 25
+"""Convex programs in all, those before Newton's method is tried, and step lengths tried after each."""
 
 
 class Program(NamedTuple):
@@ -46,59 +46,54 @@ class Program(NamedTuple):
 
 @dataclass(frozen=True)
 class Polished:
-    """z, its cost, the last convex program's move and how many were solved; stationary: move within STATIONARY."""
+    """z, its cost, how far the last convex program moved it, and how many were solved."""
 
     z: Array
     cost: float
     moved: float
     rounds: int
 
-    @property
-    def stationary(self) -> bool:
-        return self.moved <= STATIONARY
-
 
 def polish(model: Model, sequence: Sequence, z: Array) -> Polished:
     """Stationary point reached downhill from z."""
     forces = forces_at(model, sequence, z)
-    cost, moved, rounds = forces.cost, np.inf, 0
-    while rounds < ROUNDS:
-        rounds += 1
+    cost, moves = forces.cost, []
+    while len(moves) < ROUNDS and not _stuck(moves):
         program = first_order(model, sequence, z, forces.weights, settle_regions(model, sequence, z))
         status, v, u = solve_qp(
             program.H, program.g, program.A, program.b, program.equalities, 4 * model.iterations
         )
         if status != SOLVED:
             break
-        moved = float(np.abs(v[: len(z)] - z).max(initial=0.0))
-        if moved <= STATIONARY:
+        moves.append(float(np.abs(v[: len(z)] - z).max(initial=0.0)))
+        if moves[-1] <= STATIONARY:
             break
-        candidates = [z + 0.5**k * (v[: len(z)] - z) for k in range(25)]
-        if rounds > PATIENCE:
-            curved = newton(
-                model, sequence, program, np.concatenate([z, *_weights(program, forces.weights)]), u
-            )
-            candidates.insert(
-                0,
-                np.concatenate(
-                    [
-                        np.clip(curved[: len(sequence.lo)], sequence.lo, sequence.hi),
-                        curved[len(sequence.lo) : len(z)],
-                    ]
-                ),
-            )
-        for trial in candidates:
+        steps = [z + 0.5**k * (v[: len(z)] - z) for k in range(HALVINGS)]
+        if len(moves) > PATIENCE:
+            here = np.concatenate([z, *_used(program, forces.weights)])
+            steps.insert(0, _inside(sequence, newton(model, sequence, program, here, u)[: len(z)]))
+        for trial in steps:
             reached = forces_at(model, sequence, trial)
             if reached.cost <= cost + 1e-13 * abs(cost):
                 z, cost, forces = trial, reached.cost, reached
                 break
         else:
             break
-    return Polished(z, cost, moved, rounds)
+    return Polished(z, cost, moves[-1] if moves else np.inf, len(moves))
 
 
-def _weights(program: Program, weights: Array) -> list[Array]:
+def _stuck(moves: list[float]) -> bool:
+    """Near a stationary point, but no nearer over the last rounds: rounding is all that moves it."""
+    return len(moves) > 2 * PATIENCE and min(moves[-PATIENCE:]) > 0.5 * min(moves[:-PATIENCE])
+
+
+def _used(program: Program, weights: Array) -> list[Array]:
     return [weights[t, : program.first[t + 1] - program.first[t]] for t in range(len(weights))]
+
+
+def _inside(sequence: Sequence, z: Array) -> Array:
+    rho = np.clip(z[: len(sequence.lo)], sequence.lo, sequence.hi)
+    return np.concatenate([rho, z[len(rho) :]])
 
 
 @njit(cache=True)
@@ -163,10 +158,13 @@ def newton(model: Model, sequence: Sequence, program: Program, v: Array, u: Arra
     active |= u > 1e-10 * max(1.0, np.abs(u).max(initial=0.0))
     bent = curvature(model, sequence, program, u)
     A = program.A[active]
-    zero = np.zeros((len(A), len(A)))
-    matrix = np.block([[program.H + bent, A.T], [A, zero]])
+    dependent = -1e-12 * np.eye(len(A))  # active constraints may depend on one another
+    matrix = np.block([[program.H + bent, A.T], [A, dependent]])
     right = np.concatenate([bent @ v - program.g, program.b[active]])
-    return np.linalg.lstsq(matrix, right, rcond=1e-13)[0][: len(v)]
+    try:
+        return np.linalg.solve(matrix, right)[: len(v)]
+    except np.linalg.LinAlgError:
+        return v
 
 
 def curvature(model: Model, sequence: Sequence, program: Program, u: Array) -> Array:
