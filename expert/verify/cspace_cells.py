@@ -18,10 +18,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
+from expert.caging.frame import Frame
 from expert.caging.problem import Arrangement
 from expert.geometry.cover import clip, half_planes, overlapping_cover
 from expert.geometry.polygon import simple_polygon
-from expert.geometry.pose import Array, rotation, to_world
+from expert.geometry.pose import Array, rotation
 
 INNER_MARGIN = 1e-6
 """Inner shapes are eroded by this, so that neither rounding nor the start tolerance can turn an escape into a cage."""
@@ -73,35 +74,6 @@ class SweptShape:
     corners: Array
 
 
-@dataclass(frozen=True)
-class Frame:
-    """Similarity between the world [m] and the relative lengths in which cells are computed."""
-
-    centre: Array
-    radius: float
-    pose: Array
-
-    @classmethod
-    def of(cls, arrangement: Arrangement) -> "Frame":
-        circle = shapely.minimum_bounding_circle(shapely.MultiPoint(arrangement.shape.vertices))
-        centre = np.array(circle.centroid.coords[0])
-        radius = float(np.linalg.norm(arrangement.shape.vertices - centre, axis=1).max())
-        return cls(centre, radius, arrangement.pose)
-
-    def relative(self, points_w: Array) -> Array:
-        """World points (..., 2) in the relative frame."""
-        at_start = to_world(self.pose, self.centre[None])[0]
-        return (points_w - at_start) @ rotation(self.pose[2]) / self.radius
-
-    def world_pose(self, configuration: Array) -> Array:
-        """Body poses (..., 3) [m, rad] of relative configurations (..., 3)."""
-        angle = self.pose[2] + configuration[..., 2]
-        at_start = to_world(self.pose, self.centre[None])[0]
-        reference = at_start + self.radius * configuration[..., :2] @ rotation(self.pose[2]).T
-        origin = reference - (rotation(angle) @ self.centre[:, None])[..., 0]
-        return np.concatenate([origin, angle[..., None]], axis=-1)
-
-
 class CellComplex:
     """Free components of the cells of one arrangement, computed when asked for and kept.
 
@@ -112,7 +84,7 @@ class CellComplex:
     def __init__(self, arrangement: Arrangement, slack: float = 0.0, *, on_grid: bool = False) -> None:
         self._arguments = arrangement, slack
         self._grid = GRID if on_grid else None
-        self.frame = Frame.of(arrangement)
+        self.frame = Frame.of(arrangement.shape, arrangement.pose)
         self.fingers = self.frame.relative(arrangement.fingers)
         self.walls = self.frame.relative(arrangement.walls)
         self._vertices = arrangement.shape.vertices

@@ -6,10 +6,11 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from expert.caging.frame import Frame
 from expert.caging.problem import Arrangement, Shape
 from expert.caging.shapes import named_shape
 from expert.geometry.pose import Array, rotation, to_body
-from expert.verify.cspace_cells import Cell, CellComplex, Frame, inner_piece, outer_piece
+from expert.verify.cspace_cells import Cell, CellComplex, inner_piece, outer_piece
 
 
 def convex(rng: np.random.Generator) -> Array:
@@ -64,7 +65,7 @@ def test_components_enclose_and_are_enclosed_by_the_free_space(width: int) -> No
     arrangement = Arrangement(
         shape=Shape(vertices=named_shape("T")), pose=np.zeros(3), fingers=fingers, walls=walls
     )
-    complex_, frame = CellComplex(arrangement), Frame.of(arrangement)
+    complex_, frame = CellComplex(arrangement), Frame.of(arrangement.shape, arrangement.pose)
     cell = Cell(37 * width, width)
     inner = shapely.union_all(complex_.inner(cell).polygons)
     outer = shapely.union_all(complex_.outer(cell).polygons)
@@ -92,7 +93,7 @@ def test_the_frame_keeps_shape_and_start() -> None:
     arrangement = Arrangement(
         shape=Shape(vertices=named_shape("T") + 0.4), pose=pose, fingers=np.array([[5.0, 5.0], [6.0, 5.0]])
     )
-    frame = Frame.of(arrangement)
+    frame = Frame.of(arrangement.shape, arrangement.pose)
     assert frame.world_pose(np.zeros(3)) == pytest.approx(pose)
     moved = frame.world_pose(np.array([0.5, 0.25, 0.1]))
     # A world point fixed to the object has relative coordinates that turn by 0.1 about the moved reference.

@@ -1,0 +1,159 @@
+"""Swept-Minkowski MIP: fingers whose obstacles form a loop around the start at all orientations of a range [L, U] and a
+filled loop at its ends.  All lengths relative (`expert.caging.frame`).
+
+p[n]          finger n                                H[n][i, j]   exit piece i of n meets entry piece j of n + 1
+R[n, r]       region of finger n at the start         W[n, r, (i, j)] = 1 iff finger n is in region r with entry i, exit j
+k[n]          full turns between exit of n and entry of n + 1
+y[e][t]       points that fill the loop at limit e in {L, U}; triangle t of a fan
+
+Why a solution is a cage: the loop of overlapping pieces exists at every orientation of [L, U] and moves continuously, it
+winds once around the start, and at L and U it can be contracted inside the obstacles, so the free component of the start
+cannot reach either end, nor cross the loop in between (docs/caging.md).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from expert.caging.swept import REACH, SweptGeometry
+from expert.geometry.pose import Array, rotation
+from expert.mip.backends import Answer, Solver
+from expert.mip.linear import LinearModel
+from expert.types import IntArray
+
+MOST_TURNS = 2
+ANGLE_MARGIN = 1e-3
+"""[rad]"""
+
+
+@dataclass(frozen=True)
+class Ring:
+    """Fingers in the order of the loop: `free` of them searched, the others at given relative positions (m, 2)."""
+
+    free: int
+    fixed: Array
+
+    @property
+    def count(self) -> int:
+        """All of them."""
+        return self.free + len(self.fixed)
+
+
+class SweptModel:
+    """Variables and constraints for one range of orientations; `hub` is the fan's apex at the lower limit."""
+
+    def __init__(
+        self, geometry: SweptGeometry, ring: Ring, low: float, high: float, *, hub: int = 0
+    ) -> None:
+        self.geometry, self.ring, self.limits = geometry, ring, (low, high)
+        self.milp = LinearModel()
+        self.p = self.milp.add((ring.count, 2), -REACH, REACH)
+        self.overlaps = geometry.overlaps(low, high)
+        self.pairs = [
+            (int(i), int(j)) for i, j in zip(*np.nonzero(geometry.meeting), strict=True)
+        ]
+        self.feasible = bool(self.overlaps) and bool(self.pairs)
+        if not self.feasible:
+            return
+        self._keep_fixed()
+        self._choose_regions_and_pieces()
+        self._loop()
+        self._winding()
+        self._fill(0, hub)
+        self._fill(1, 0)
+
+    def _keep_fixed(self) -> None:
+        fixed = self.p[self.ring.free :]
+        if len(fixed):
+            self.milp.equal([(1.0, fixed)], self.ring.fixed)
+
+    def _choose_regions_and_pieces(self) -> None:
+        """Non-penetration at the start: W = 1 => p in its region; entry and exit pieces meet."""
+        m, n = self.milp, self.ring.count
+        regions = self.geometry.regions
+        self.R = m.binaries(n, len(regions))
+        self.W = m.add((n, len(regions), len(self.pairs)), 0.0, 1.0)
+        m.equal([(1.0, self.R)], np.ones(n))
+        m.equal([(1.0, self.W), (-1.0, self.R[..., None])], np.zeros((n, len(regions))))
+        s = m.add((n, len(regions), 2), -REACH, REACH)
+        m.equal([(1.0, self.p), (-1.0, np.swapaxes(s, 1, 2))], np.zeros((n, 2)))
+        for d in range(2):
+            for sign in (1.0, -1.0):
+                m.at_most([(sign, s[..., d]), (-REACH, self.R)], np.zeros(self.R.shape))
+        for r, region in enumerate(regions):
+            for a, b in zip(region.A, region.b, strict=True):
+                m.at_most([(a, s[:, r]), (-b, self.R[:, r, None])], np.zeros(n))
+
+    def _loop(self) -> None:
+        """Exactly one pair of pieces joins neighbours, for all orientations: H = 1 => p[n] - p[n+1] in K_ij."""
+        m, n = self.milp, self.ring.count
+        keys = list(self.overlaps)
+        self.H = m.binaries(n, len(keys))
+        m.equal([(1.0, self.H)], np.ones(n))
+        d = m.add((n, len(keys), 2), -2 * REACH, 2 * REACH)
+        following = np.roll(self.p, -1, axis=0)
+        m.equal([(1.0, self.p), (-1.0, following), (-1.0, np.swapaxes(d, 1, 2))], np.zeros((n, 2)))
+        for k, key in enumerate(keys):
+            for a, b in zip(*self.overlaps[key], strict=True):
+                m.at_most([(a, d[:, k]), (-b, self.H[:, k, None])], np.zeros(n))
+        exit_of, entry_of = (np.array([key[e] for key in keys]) for e in (0, 1))
+        entry, exit_ = (np.array([pair[e] for pair in self.pairs]) for e in (0, 1))
+        for c in range(len(self.geometry.pieces)):
+            leaves, enters = self.H[:, exit_of == c], np.roll(self.H, 1, axis=0)[:, entry_of == c]
+            for joins, ends in ((leaves, exit_ == c), (enters, entry == c)):
+                chosen = self.W[:, :, ends].reshape(n, -1)
+                m.equal([(1.0, joins), (-1.0, chosen)], np.zeros(n))
+
+    def _winding(self) -> None:
+        """Winding number one about the start, from directions that are linear in W."""
+        m, n = self.milp, self.ring.count
+        alpha = self.geometry.directions
+        entry, exit_ = (np.array([pair[e] for pair in self.pairs]) for e in (0, 1))
+        k = m.add((n,), -MOST_TURNS, MOST_TURNS, integral=True)
+        flat = self.W.reshape(n, -1)
+        into = np.broadcast_to(alpha[:, entry].reshape(1, -1), flat.shape)
+        out = np.broadcast_to(alpha[:, exit_].reshape(1, -1), flat.shape)
+        for sign in (1.0, -1.0):
+            gap = [
+                (sign * into, np.roll(flat, -1, axis=0)),
+                (-sign * out, flat),
+                (sign * 2 * np.pi, k[:, None]),
+            ]
+            m.at_most(gap, np.full(n, np.pi - ANGLE_MARGIN))
+        m.equal([(1.0, k)], 1.0)
+
+    def _fill(self, end: int, hub: int) -> None:
+        """At a limit, triangle t of the fan (hub, hub+t+1, hub+t+2) has a point common to the pieces of its fingers."""
+        m, n = self.milp, self.ring.count
+        turn = rotation(self.limits[end])
+        triangles = max(1, n - 2)
+        y = m.add((triangles, 2), -2 * REACH, 2 * REACH)
+        for t in range(triangles):
+            corners = sorted({hub % n, (hub + t + 1) % n, (hub + t + 2) % n}) if n > 2 else [0, 1]
+            for c in corners:
+                f = m.add((len(self.pairs), 2), -2 * REACH, 2 * REACH)
+                # R^T (p - y) = sum f, row by row of R^T
+                for d in range(2):
+                    m.equal(
+                        [(turn[:, d], self.p[c]), (-turn[:, d], y[t]), (-1.0, f[:, d])], 0.0
+                    )
+                for q, (i, j) in enumerate(self.pairs):
+                    A, b = self.geometry.common(i, j)
+                    rows = len(b)
+                    chosen = np.broadcast_to(self.W[c, :, q], (rows, self.W.shape[1]))
+                    m.at_most(
+                        [(A, np.broadcast_to(f[q], (rows, 2))), (-b[:, None], chosen)], np.zeros(rows)
+                    )
+
+    def order_first(self, others: IntArray) -> None:
+        """Break the symmetry of renaming: finger 0 is leftmost among `others`."""
+        self.milp.at_most([(1.0, np.broadcast_to(self.p[0, 0], others.shape)), (-1.0, self.p[others, 0])], np.zeros(len(others)))
+
+    def solve(self, solver: Solver, time_limit: float) -> Answer:
+        """An answer's x holds the positions at `p` and the binaries at `R` and `H`."""
+        return self.milp.solve(solver, time_limit=time_limit)
+
+    def cut(self, x: Array) -> None:
+        """Never again this choice of regions and meetings."""
+        on = np.concatenate([v.ravel()[x[v.ravel()] > 0.5] for v in (self.R, self.H)])
+        self.milp.at_most([(1.0, on)], len(on) - 1.0)

@@ -1,0 +1,188 @@
+"""Convex sets of the swept-Minkowski model, in relative lengths about the object at its start pose.
+
+C_i     pieces of an overlapping convex cover of the object
+D_ij    C_i + (-C_j): p - p' in R(t) D_ij iff the obstacles of pieces i of finger p and j of finger p' overlap
+K_ij    intersection of R(t) D_ij over the whole range [L, U] of orientations, from inside
+regions convex parts of the free plane around the object at its start pose
+alpha   direction in which all of obstacle piece i lies, seen from the start, while its finger is in region r
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from expert.geometry.convex import Region, free_regions
+from expert.geometry.cover import clip, half_planes, overlapping_cover
+from expert.geometry.polygon import facet_frames, facets
+from expert.geometry.pose import Array, cross, rotation
+
+STEP = np.radians(2.5)
+"""Largest part of a rotation range that is swept at once."""
+REACH = 4.0
+"""Fingers stay within this distance (in enclosing radii) of the reference point, per coordinate."""
+BoolMatrix = np.ndarray[tuple[int, int], np.dtype[np.bool_]]
+
+
+@dataclass(frozen=True)
+class SweptGeometry:
+    """Sets of one object.  vertices (V, 2) relative; clearance: relative distance that every condition keeps."""
+
+    vertices: Array
+    clearance: float
+
+    @cached_property
+    def pieces(self) -> list[Array]:
+        """C_i, overlapping."""
+        return overlapping_cover(self.vertices)
+
+    @cached_property
+    def meeting(self) -> BoolMatrix:
+        """Whether pieces i and j overlap with an area that survives erosion by the clearance."""
+        n = len(self.pieces)
+        return np.array([[len(self.common(i, j)[1]) > 0 for j in range(n)] for i in range(n)])
+
+    def common(self, i: int, j: int) -> tuple[Array, Array]:
+        """C_i intersect C_j eroded, as {x : A x <= b}; empty arrays where nothing is left."""
+        A, b = half_planes(self.pieces[i])
+        overlap = clip(self.pieces[j], A, b)
+        if not _has_area(overlap):
+            return np.empty((0, 2)), np.empty(0)
+        A, b = half_planes(_cleaned(overlap))
+        inner = clip(overlap, A, b - self.clearance)
+        return (A, b - self.clearance) if _has_area(inner) else (np.empty((0, 2)), np.empty(0))
+
+    @cached_property
+    def differences(self) -> dict[tuple[int, int], Array]:
+        """D_ij as convex polygons."""
+        indices = range(len(self.pieces))
+        return {(i, j): _minkowski(self.pieces[i], -self.pieces[j]) for i in indices for j in indices}
+
+    def overlaps(self, low: float, high: float) -> dict[tuple[int, int], tuple[Array, Array]]:
+        """Non-empty K_ij over [low, high], eroded, as {x : A x <= b}."""
+        sets = {}
+        for key, polygon in self.differences.items():
+            swept = _swept_inside(polygon, low, high, self.clearance)
+            if _has_area(swept):
+                sets[key] = half_planes(_simplified(_cleaned(swept)))
+        return sets
+
+    @cached_property
+    def regions(self) -> list[Region]:
+        """Convex regions for fingers; those with facets of the object as bounds keep clear of them."""
+        cleared = [self._cleared(region) for region in free_regions(self.vertices)]
+        square = REACH * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        return [r for r in cleared if _has_area(clip(square, r.A, r.b))]
+
+    def _cleared(self, region: Region) -> Region:
+        inward, _ = facet_frames(self.vertices)
+        offsets = (inward * facets(self.vertices)[0]).sum(axis=1)
+        same = (np.abs(region.A[:, None] - inward[None]).max(axis=2) < 1e-9) & (
+            np.abs(region.b[:, None] - offsets[None]) < 1e-9
+        )
+        return Region(region.A, region.b - self.clearance * same.any(axis=1))
+
+    @cached_property
+    def directions(self) -> Array:
+        """alpha[r, i] [rad]: while p is in region r, u . (p - c) > 0 for all c in C_i, with u at angle alpha.
+
+        Along pieces that meet, neighbouring angles differ by less than pi: the object is simply connected and the
+        finger outside it, so that such angles exist.
+        """
+        square = REACH * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        rows = []
+        for region in self.regions:
+            corners = clip(square, region.A, region.b)
+            normals = [_separating(corners, piece) for piece in self.pieces]
+            rows.append(self._lifted(np.array([np.arctan2(n[1], n[0]) for n in normals])))
+        return np.array(rows)
+
+    def _lifted(self, angles: Array) -> Array:
+        """Full turns added so that pieces that meet have neighbouring angles."""
+        lifted, known = angles.copy(), {0}
+        frontier = [0]
+        while frontier:
+            i = frontier.pop()
+            for j in set(np.flatnonzero(self._touching[i]).tolist()) - known:
+                lifted[j] += 2 * np.pi * np.round((lifted[i] - lifted[j]) / (2 * np.pi))
+                known.add(j)
+                frontier.append(j)
+        return lifted
+
+    @cached_property
+    def _touching(self) -> BoolMatrix:
+        polygons = np.array([shapely.Polygon(p) for p in self.pieces])
+        return shapely.area(shapely.intersection(polygons[:, None], polygons[None])) > 1e-9
+
+
+def swept_steps(low: float, high: float) -> list[tuple[float, float]]:
+    """(middle, half-width) of equal parts of [low, high], none wider than STEP."""
+    count = max(1, int(np.ceil((high - low) / STEP - 1e-9)))
+    half = (high - low) / (2 * count)
+    return [(low + (2 * k + 1) * half, half) for k in range(count)]
+
+
+def _swept_inside(polygon: Array, low: float, high: float, clearance: float) -> Array:
+    """Convex polygon inside R(t) polygon for all t in [low, high], eroded.
+
+    {y : n . y <= d} holds while it turns by up to h either way if it holds turned by +-h and, for d > 0, with the chord
+    d cos h of the arc of tangent points in the middle.
+    """
+    normals, offsets = half_planes(polygon)
+    offsets = offsets - clearance
+    result = polygon @ rotation(low).T
+    bulging = offsets > 0
+    for middle, half in swept_steps(low, high):
+        for angle in (middle - half, middle + half):
+            result = clip(result, normals @ rotation(angle).T, offsets)
+        result = clip(
+            result, normals[bulging] @ rotation(middle).T, offsets[bulging] * np.cos(half)
+        )
+        if len(result) < 3:
+            break
+    return result
+
+
+def _minkowski(a: Array, b: Array) -> Array:
+    sums = (a[:, None] + b[None]).reshape(-1, 2)
+    hull = shapely.geometry.polygon.orient(shapely.MultiPoint(sums).convex_hull)
+    return np.array(hull.exterior.coords)[:-1]
+
+
+def _separating(free: Array, piece: Array) -> Array:
+    """Unit normal u with the widest gap min u . free - max u . piece; an edge normal of one of the two polygons."""
+    candidates = np.concatenate([-half_planes(_cleaned(free))[0], half_planes(piece)[0]])
+    gaps = (free @ candidates.T).min(axis=0) - (piece @ candidates.T).max(axis=0)
+    return candidates[int(gaps.argmax())]
+
+
+def _has_area(polygon: Array) -> bool:
+    return len(polygon) >= 3 and shapely.Polygon(polygon).area > 1e-9
+
+
+def _cleaned(polygon: Array) -> Array:
+    """Without corners closer than 1e-7 to the next and without straight ones."""
+    ahead = np.roll(polygon, -1, axis=0) - polygon
+    kept = polygon[np.linalg.norm(ahead, axis=1) > 1e-7]
+    return kept
+
+
+def _simplified(polygon: Array, share: float = 0.01) -> Array:
+    """Convex polygon inside, with as few corners as cost at most this share of the area each."""
+    area = shapely.Polygon(polygon).area
+    while len(polygon) > 4:
+        before, after = np.roll(polygon, 1, axis=0), np.roll(polygon, -1, axis=0)
+        ears = 0.5 * cross(polygon - before, after - before)
+        k = int(ears.argmin())
+        if ears[k] > share * area:
+            break
+        polygon = np.delete(polygon, k, axis=0)
+    return polygon
+
+
+def regions_are_disjoint_from(pieces: list[Array], regions: list[Region]) -> bool:
+    """Whether no region enters a piece (for tests)."""
+    return all(not _has_area(clip(p, r.A, r.b)) for p in pieces for r in regions)
+
+
