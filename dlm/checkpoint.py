@@ -99,6 +99,7 @@ def read_about(path: Path, *, command: str) -> About:
                 got=f"schema {about.get('schema')}",
                 remedy=f"make it again with: {command}",
             )
+        _require_own_classes(about["settings"], path)
         return About(**about)
     except (SafetensorError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise InvalidProblem(
@@ -107,6 +108,19 @@ def read_about(path: Path, *, command: str) -> About:
             got=f"{type(error).__name__}: {error}".splitlines()[0],
             remedy=f"make it again with: {command}",
         ) from error
+
+
+def _require_own_classes(settings: object, path: Path) -> None:
+    """Settings may name classes to build: only this package's, or a file from elsewhere could run anything."""
+    if isinstance(settings, Mapping):
+        target = settings.get("_target_", "dlm.")
+        if not str(target).startswith("dlm."):
+            raise InvalidProblem(f"checkpoint {path}", expected="classes of dlm", got=f"{target}"[:60])
+        for value in settings.values():
+            _require_own_classes(value, path)
+    elif isinstance(settings, list):
+        for value in settings:
+            _require_own_classes(value, path)
 
 
 def _part(tensors: Mapping[str, Tensor], prefix: str) -> dict[str, Tensor]:

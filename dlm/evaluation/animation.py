@@ -1,6 +1,10 @@
 """Executed actions as small animated SVG pictures that a browser plays without scripts."""
 
+import base64
+import io
+
 import numpy as np
+from PIL import Image
 
 from dlm.execution import PUSHING
 from dlm.inverse_dynamics import Action
@@ -9,7 +13,7 @@ from dlm.simulator.replay import Replay, replay
 from dlm.tasks import TaskBatch
 from expert.geometry.pose import Array, to_world
 
-WIDTH = 190
+WIDTH = 155
 """Of a picture [px]."""
 MARGIN, BELOW = 0.04, 0.015
 """Seen beyond the desired motion, and below the floor [m]."""
@@ -18,6 +22,18 @@ SECONDS = 3.0
 STRIDE = 4
 """Substeps from one key frame to the next."""
 FINGER_COLOURS = ("#d62728", "#1f77b4", "#9467bd", "#2ca02c")
+
+
+def input_film(tasks: TaskBatch, k: int) -> str:
+    """The video of task k as an image that plays itself."""
+    frames = [Image.fromarray(frame) for frame in tasks.video[k].numpy()]
+    pause = round(750 * SECONDS / (len(frames) - 1))
+    rest = round(1000 * SECONDS) - pause * (len(frames) - 1)
+    out = io.BytesIO()
+    durations = [*[pause] * (len(frames) - 1), rest]
+    frames[0].save(out, format="GIF", save_all=True, append_images=frames[1:], duration=durations, loop=0)
+    data = base64.b64encode(out.getvalue()).decode()
+    return f'<img class="video" width="{WIDTH}" alt="input video" src="data:image/gif;base64,{data}">'
 
 
 def animate(tasks: TaskBatch, k: int, action: Action, simulator: SimulatorSettings) -> str:

@@ -99,6 +99,6 @@ def _draw_parameters(ax: Axes, tasks: TaskBatch, k: int, t: int, parameters: Par
     for c, colour in zip(range(P.contact.shape[2]), FINGER_COLOURS, strict=False):
         touching = float(P.contact[k, t, c].clamp(0.15, 1))
         ax.plot(*P.facets[k, t, c].numpy().T, color=colour, lw=2.5, alpha=touching, solid_capstyle="round")
-    for point, rays in zip(P.external_points[k, t].numpy(), P.external_cones[k, t].numpy(), strict=True):
-        if np.abs(rays).sum() > 0.5:
+    for point, present in zip(P.external_points[k, t].numpy(), P.external_contact[k, t], strict=True):
+        if present > 0.5:
             ax.plot(*point, "^", color="tab:green", ms=4)

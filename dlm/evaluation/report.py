@@ -19,6 +19,7 @@ thead th { border-bottom: 2px solid #444; }
 figure { margin: 1em 0; } figcaption { color: #555; max-width: 60em; }
 img { max-width: 100%; }
 .films { display: flex; flex-wrap: wrap; gap: 1em; align-items: flex-end; } .films figure { margin: 0; text-align: center; }
+.video { image-rendering: pixelated; } .details { columns: 2; } .details details { break-inside: avoid; }
 details { margin: .5em 0; } summary { cursor: pointer; font-weight: 600; }
 """
 
@@ -52,7 +53,7 @@ def html_report(table: Table, curves: Figure, examples: Sequence[Example]) -> st
 <html lang="en"><head><meta charset="utf-8"><title>Manipulation from video: Table 4.1</title><style>{STYLE}</style></head><body>
 <h1>Manipulation from video</h1><p>{INTRODUCTION}</p>
 <h2>Table 4.1: object-trajectory loss [cm²] and seconds per task</h2>{_table(*table.main())}
-{details}
+<div class="details">{details}</div>
 <h2>Training curves</h2>{_figure(curves, "As Fig. 4-6 of the thesis: losses in the rigid simulator while the stages learn.")}
 <h2>Examples</h2>
 <p>Dashed: desired motion. Yellow: simulated object. Dots: fingers; lines: forces. In rows called <i>derendered</i>, coloured

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from dlm.checkpoint import About, versions
-from dlm.evaluation.animation import animate
+from dlm.evaluation.animation import animate, input_film
 from dlm.evaluation.curves import curves_figure
 from dlm.evaluation.outcomes import Outcome, act, execute
 from dlm.evaluation.picture import derendered, task_figure
@@ -73,7 +73,7 @@ class Study:
             for title, row in outcomes.items()
         ]
         machine = f"{platform.machine()}, {platform.system()}"
-        return Table(lines=lines, origin={**origin, "versions": versions(), "machine": machine})
+        return Table(lines=lines, origin={**origin, "machine": machine, "versions": versions()})
 
     def _seconds(self, one: Trained) -> Seconds:
         policy = one.policies[0]
@@ -93,10 +93,9 @@ class Study:
         tasks = self.tasks[dataset]
         shown = {title: row[dataset][0] for title, row in outcomes.items() if title != IDLE}
         parameters = {one.title: derendered(one.policies[0], tasks) for one in self.trained}
+        films = {title: animate(tasks, k, one.action, self.simulator) for title, one in shown.items()}
         return Example(
             title=f"{dataset} {k}: {tasks.samples[k].family.replace('_', ' ')}",
             strip=task_figure(tasks, k, shown, parameters),
-            films={
-                title: animate(tasks, k, outcome.action, self.simulator) for title, outcome in shown.items()
-            },
+            films={"input": input_film(tasks, k), **films},
         )

@@ -15,10 +15,12 @@ DATASETS = {"train": "train", "finetune": "fine-tune", "test": "test", "family":
 
 @dataclass(frozen=True, kw_only=True)
 class Cell:
-    """One architecture on one data set; means over tasks, then over seeds; spread: standard deviation over seeds.
+    """One architecture on one data set; means over tasks, then over seeds.
 
-    loss [cm^2], median [cm^2], ratio to no action, RMS distance [mm] and angle [deg], share of tasks within 2 mm and 2 deg;
-    tasks in which the object was dropped and tasks whose program was not solved, as `seed number: task number`.
+    loss, median: object-trajectory loss [cm^2]; spread: its standard deviation over seeds; ratio: to the loss of no action.
+    finger_loss [cm^2]: none where the fingers wait on purpose.  rms_mm, rms_deg: errors over the motion.
+    within: share of tasks that end within 2 mm and 2 deg.  dropped, unsolved: per seed, the tasks in which the object ended
+    too low, and those whose program was not solved.
     """
 
     tasks: int
@@ -26,7 +28,7 @@ class Cell:
     spread: float
     median: float
     ratio: float
-    finger_loss: float
+    finger_loss: float | None
     rms_mm: float
     rms_deg: float
     within: float
@@ -37,6 +39,7 @@ class Cell:
     def of(cls, outcomes: Sequence[Outcome], idle: Outcome) -> "Cell":
         """Of one architecture's outcomes, one per seed."""
         losses = [o.object_loss.mean() for o in outcomes]
+        waiting = any(o is idle for o in outcomes)
         rms_mm, rms_deg = np.mean([o.rms for o in outcomes], axis=0)
         return cls(
             tasks=len(idle.poses),
@@ -44,7 +47,7 @@ class Cell:
             spread=float(np.std(losses, ddof=1)) if len(losses) > 1 else 0.0,
             median=float(np.median([o.object_loss for o in outcomes])),
             ratio=float(np.mean(losses) / idle.object_loss.mean()),
-            finger_loss=float(np.mean([o.finger_loss.mean() for o in outcomes])),
+            finger_loss=None if waiting else float(np.mean([o.finger_loss.mean() for o in outcomes])),
             rms_mm=float(rms_mm),
             rms_deg=float(rms_deg),
             within=float(np.mean([o.success.mean() for o in outcomes])),
@@ -95,7 +98,7 @@ class Table:
             "Object-trajectory loss [cm²] (mean over tasks and seeds ± standard deviation over seeds) and seconds per task.",
             _grid(*self.main()),
             *(f"{title}\n\n{_grid(*self.detail(kind))}" for kind, title in DETAILS.items()),
-            "Dropped objects, by task (data set: tasks of the first seed, …)\n\n" + self._drops(),
+            "Objects that end more than 5 mm too low, by task number (seeds apart by |)\n\n" + self._drops(),
             "How it came about\n\n" + "\n".join(f"* {k}: {v}" for k, v in self.origin.items()),
         ]
         return "\n\n".join(sections) + "\n"
@@ -135,7 +138,7 @@ DETAILS = {
     "within": "Share of tasks that end within 2 mm and 2°",
     "rms": "RMS error over the motion [mm, °]",
     "finger": "Finger-trajectory loss [cm²], against the expert's positions",
-    "drops": "Dropped objects per seed (programs not solved)",
+    "drops": "Objects that end too low, dropped or never lifted, per seed (programs not solved)",
 }
 
 
@@ -152,7 +155,7 @@ def _detail(cell: Cell, kind: str) -> str:
         "median": _number(cell.median),
         "within": f"{cell.within:.3f}",
         "rms": f"{cell.rms_mm:.2f}, {cell.rms_deg:.2f}",
-        "finger": _number(cell.finger_loss),
+        "finger": "–" if cell.finger_loss is None else _number(cell.finger_loss),
         "drops": f"{drops:g} of {cell.tasks} ({unsolved:g})",
     }[kind]
 
