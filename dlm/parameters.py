@@ -61,16 +61,6 @@ class ParameterBatch:
         """The same function on every field, for instance `.map(Tensor.detach)` or `.map(lambda x: x[mask])`."""
         return replace(self, **{name: function(value) for name, value in self.tensors().items()})
 
-    def rounded(self) -> "ParameterBatch":
-        """Flags rounded to 0 or 1; gradients pass as if they had not been (straight-through)."""
-        hard = {n: v + (v.round() - v).detach() for n, v in self.tensors().items() if n in FLAGS}
-        return replace(self, **hard)
-
-    @property
-    def batch(self) -> int:
-        """Number of tasks b."""
-        return self.contact.shape[0]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Layout:

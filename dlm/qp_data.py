@@ -105,7 +105,10 @@ class QPWeights:
 
     @classmethod
     def of(cls, cost: Cost, *, dt: float, length: float, force: float, slack: float | None) -> "QPWeights":
-        """The expert's cost in units of (1/F^2): see docs/inverse-dynamics.md."""
+        """The expert's cost over F^2.  Raises InvalidProblem for costs without a unique optimum, or with a cone margin."""
+        require(cost.force > 0, "cost.force", "a positive number", cost.force)
+        require(cost.acceleration > 0, "cost.acceleration", "a positive number", cost.acceleration)
+        require(cost.margin == 0, "cost.margin", "0", cost.margin, "the QP has no reward for cone margins")
         acceleration = cost.acceleration * (length / dt**2) ** 2 / force**2
         return cls(
             force=cost.force,

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 import diffcp
@@ -24,7 +25,10 @@ Solution = tuple[Array, Array, Adjoint | None]
 
 
 class DiffcpClarabel(SolverInterface):
-    """Canonical cone programs to primal and dual solutions; rows of nan mark the programs without one."""
+    """Canonical cone programs to primal and dual solutions; rows of nan mark the programs without one.
+
+    Derivatives by DIFFCP's dense factorisation: its iterative one stops far from the answer on these programs.
+    """
 
     canon_solver = "DIFFCP"
 
@@ -41,7 +45,10 @@ class DiffcpClarabel(SolverInterface):
     ) -> tuple[Tensor, Tensor, list[Adjoint | None]]:
         """Primal (b, n), dual (b, m) and the adjoints of the solution maps."""
         with ThreadPoolExecutor(torch.get_num_threads()) as pool:
-            solved = list(pool.map(self._solve, A.detach().numpy(), q.detach().numpy()[:, :-1]))
+            solve = partial(
+                self._solve, mode="dense" if needs_grad else "lsqr"
+            )  # the latter prepares nothing
+            solved = list(pool.map(solve, A.detach().numpy(), q.detach().numpy()[:, :-1]))
         primal, dual, adjoints = zip(*solved, strict=True)
         return torch.from_numpy(np.stack(primal)), torch.from_numpy(np.stack(dual)), list(adjoints)
 
@@ -54,14 +61,14 @@ class DiffcpClarabel(SolverInterface):
         costs, entries = (torch.from_numpy(np.stack([r[i] for r in rows])) for i in (0, 1))
         return None, costs, entries
 
-    def _solve(self, entries: Array, cost: Array) -> Solution:
+    def _solve(self, entries: Array, cost: Array, mode: str) -> Solution:
         nothing = np.full(self.shape[1] - 1, np.nan), np.full(self.shape[0], np.nan), None
         if not (np.isfinite(entries).all() and np.isfinite(cost).all()):
             return nothing
-        tries = (self._try(entries, cost, *tolerances) for tolerances in TOLERANCES)
+        tries = (self._try(entries, cost, mode, *tolerances) for tolerances in TOLERANCES)
         return next((solution for solution in tries if solution is not None), nothing)
 
-    def _try(self, entries: Array, cost: Array, asked: float, accepted: float) -> Solution | None:
+    def _try(self, entries: Array, cost: Array, mode: str, asked: float, accepted: float) -> Solution | None:
         table = sp.csc_matrix((entries.copy(), *self.pattern), shape=self.shape)
         result = diffcp.solve_and_derivative_internal(
             -table[:, :-1],
@@ -69,7 +76,7 @@ class DiffcpClarabel(SolverInterface):
             cost.copy(),
             self.cones,
             solve_method="Clarabel",
-            mode="dense",
+            mode=mode,
             **{f"tol_{name}": asked for name in ("gap_abs", "gap_rel", "feas")},
             **{f"reduced_tol_{name}": accepted for name in ("gap_abs", "gap_rel", "feas")},
         )
