@@ -12,15 +12,15 @@ import numpy as np
 import pyscipopt
 from pyscipopt import quicksum
 
-from expert.contact.recovery import Found, modes_of, plan_of
+from expert.contact.recovery import Found, balanced, modes_of, plan_of
 from expert.contact.scaled import ScaledTask
 from expert.errors import SolverFailed
 from expert.geometry.pose import Array, cross
 from expert.mip.backends import scip_answer
 from expert.types import FREE, ContactTask, Plan, Status
 
-TOLERANCE = 1e-9
-"""Absolute feasibility tolerance asked of SCIP, in m g and m g L."""
+TOLERANCE = 1e-7
+"""Absolute feasibility tolerance asked of SCIP, in m g and m g L; its linear solver warns below."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,9 @@ def solve(task: ContactTask, *, gap: float = 1e-3, time_limit: float = 60.0) -> 
         status: Status = "infeasible" if answer.status == "infeasible" else "time_limit"
         return Plan(status=status, reason=reason, **spent)
     status = "optimal" if answer.status == "optimal" else "feasible"
-    return plan_of(task, s, _found(m, task, s), status=status, reason="", **spent)
+    return plan_of(
+        task, s, balanced(s, _found(m, task, s), task.fingers.facet_margin), status=status, reason="", **spent
+    )
 
 
 def build(task: ContactTask, s: ScaledTask) -> Model:
@@ -192,7 +194,7 @@ def _wrench(arm: Array, force: Array) -> Array:
 
 def _cost(m: Model, task: ContactTask, s: ScaledTask) -> None:
     """sum |lambda|^2 + |p_ddot|^2 - beta, one epigraph variable per square."""
-    terms = []
+    terms: list[Any] = []
 
     def charge(weight: float, expression: Any) -> None:
         square = m.scip.addVar(lb=0.0)
@@ -218,7 +220,7 @@ def _cost(m: Model, task: ContactTask, s: ScaledTask) -> None:
 
 def _found(m: Model, task: ContactTask, s: ScaledTask) -> Found:
     """Values of the best point; cone weights alpha from the force's components."""
-    best = m.scip.getBestSol()
+    best: Any = m.scip.getBestSol()
     shape = (s.shape[0], task.fingers.count)
 
     def values(grid: dict, last: int) -> Array:

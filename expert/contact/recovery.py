@@ -1,11 +1,11 @@
 """From the variables of a mixed-integer model to a Plan whose cost and residual are computed from the plan itself."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from expert.contact.scaled import ScaledTask, ray_size
-from expert.geometry.pose import Array
+from expert.geometry.pose import Array, cross
 from expert.mechanics import external_contacts, inertial_wrench, wrench_about
 from expert.types import FREE, ContactForce, ContactTask, IntArray, Plan, Status
 
@@ -53,6 +53,69 @@ def plan_of(
     )
 
 
+LOOSE = 1e-4
+"""Weights above this [m g], and rho by this inside its margins, can move by a solver's tolerance."""
+
+
+def balanced(s: ScaledTask, found: Found, margin: float) -> Found:
+    """The point with Newton-Euler restored from a solver's tolerance to the last digits: two Gauss-Newton steps.
+
+    The least change of positive weights, and of one rho per contact interval, that does it; what stands at a bound
+    stays there.
+    """
+    found = replace(found, alpha=np.maximum(found.alpha, 0), reactions=np.maximum(found.reactions, 0))
+    for _ in range(2):
+        columns, interval = _wrench_columns(s, found), intervals(found.modes)
+        weights = np.concatenate(
+            [np.where(pushing(found.modes)[..., None], found.alpha, 0).ravel(), found.reactions]
+        )
+        inside = np.minimum(found.rho - margin, 1 - margin - found.rho) > LOOSE
+        slopes = _torque_slopes(s, found, np.where(inside, interval, FREE))
+        jacobian = np.concatenate([columns * (weights > LOOSE), slopes], axis=1)
+        change = np.linalg.lstsq(jacobian, s.required.ravel() - columns @ weights, rcond=None)[0]
+        weights, rho_change = weights + change[: len(weights)], np.append(change[len(weights) :], 0.0)
+        alpha, reactions = np.split(weights, [found.alpha.size])
+        rho = found.rho + np.where(inside, rho_change[interval], 0.0)
+        found = replace(found, rho=rho, alpha=alpha.reshape(found.alpha.shape), reactions=reactions)
+    return found
+
+
+def _wrench_columns(s: ScaledTask, found: Found) -> Array:
+    """Wrenches of unit weights, (3 t, weights), at the found contact positions."""
+    T, C = found.modes.shape
+    positions, _ = _fingers(s, found)
+    rays = s.rays[np.arange(T)[:, None], np.maximum(found.modes, 0)]
+    unit = wrench_about(rays, positions[:, :, None], s.centres[:, None, None])  # (t, c, k, 3)
+    own = np.zeros((T, 3, T, C, 2))
+    own[np.arange(T), :, np.arange(T)] = np.moveaxis(unit, 3, 1)
+    return np.concatenate([own.reshape(3 * T, -1), s.reactions.reshape(3 * T, -1)], axis=1)
+
+
+def _torque_slopes(s: ScaledTask, found: Found, interval: IntArray) -> Array:
+    """d torque / d rho (3 t, intervals): (b - a) x lambda at each step of an interval."""
+    T, C = found.modes.shape
+    _, forces = _fingers(s, found)
+    a, b = np.moveaxis(s.levers[np.arange(T)[:, None], np.maximum(found.modes, 0)], 2, 0)
+    slopes = np.zeros((T, 3, interval.max() + 2))  # the last column collects what is free
+    for c in range(C):
+        slopes[np.arange(T), 2, interval[:, c]] += cross(b - a, forces)[:, c]
+    return slopes[..., :-1].reshape(3 * T, -1)
+
+
+def intervals(modes: IntArray) -> IntArray:
+    """Number of the contact interval (t, c), counted over all fingers; FREE where there is none."""
+    starts = modes != FREE
+    starts[1:] &= modes[1:] != modes[:-1]
+    return np.where(modes == FREE, FREE, np.cumsum(starts.T).reshape(starts.T.shape).T - 1)
+
+
+def pushing(modes: IntArray) -> np.ndarray:
+    """Where force is allowed (t, c): in contact and, but for the last step, still there at the next."""
+    stays = modes != FREE
+    stays[:-1] &= modes[1:] == modes[:-1]
+    return stays
+
+
 def modes_of(assignment: Array) -> IntArray:
     """Facet or FREE (t, c) from contact assignment T (t, c, f)."""
     return np.where(assignment.sum(axis=2) > 0.5, assignment.argmax(axis=2), FREE)
@@ -65,9 +128,7 @@ def _fingers(s: ScaledTask, found: Found) -> tuple[Array, Array]:
     step = np.arange(len(facet))[:, None]
     a, b = np.moveaxis(s.levers[step, facet], 2, 0)
     on_facet = s.centres[:, None] + a + found.rho[..., None] * (b - a)
-    pushes = touching.copy()
-    pushes[:-1] &= (found.modes[1:] == found.modes[:-1])[..., None]
-    weights = np.where(pushes, np.maximum(found.alpha, 0), 0.0)
+    weights = np.where(pushing(found.modes)[..., None], np.maximum(found.alpha, 0), 0.0)
     return np.where(touching, on_facet, found.free), np.einsum("tck,tckd->tcd", weights, s.rays[step, facet])
 
 
