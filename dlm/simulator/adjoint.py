@@ -21,8 +21,8 @@ from dlm.simulator.step import (
     Work,
     assemble_problem,
     bias,
+    contact_scale,
     finger_mobility,
-    scale,
     softness,
     solve_step,
     support_directions,
@@ -30,7 +30,6 @@ from dlm.simulator.step import (
     vertex_arm,
     work_for,
 )
-
 
 TOUCHING = 1e-12
 """Plans start with fingers that touch: there smoothed contacts have a kink, and the mean of both slopes is taken [m]."""
@@ -49,7 +48,7 @@ def softness_slope(gap: float, physics: Physics) -> float:
 def bias_slope(gap: float, h: float, physics: Physics) -> float:
     """Derivative of `bias` with respect to the gap."""
     if gap < -SHALLOW:
-        return CORRECTION / h if bias(gap, h, physics) > -FASTEST_CORRECTION else 0.0
+        return CORRECTION / h if bias(gap, h, physics.kappa) > -FASTEST_CORRECTION else 0.0
     if np.isinf(physics.kappa) or gap < -TOUCHING:
         return 1 / h
     return 0.0 if gap > TOUCHING else 0.5 / h
@@ -58,30 +57,29 @@ def bias_slope(gap: float, h: float, physics: Physics) -> float:
 @njit(cache=True)
 def row_multipliers(n: int, work: Work, impulse_adjoint: np.ndarray, w: np.ndarray) -> None:
     """Solve B^T w = adjoint of the impulses, for the equations of the active set; w is 0 on all other rows."""
-    problem, mu = work.problem, work.contacts.friction
-    size = reduced_system(n, problem, mu, True)
+    contacts, rows = work.contacts, work.rows
+    size = reduced_system(n, contacts, rows, work.A, work.B, True)
     row = 0
     for i in range(n):
-        state = problem.state[i]
+        state, mu = contacts[i].state, contacts[i].friction
+        value, tangential = impulse_adjoint[2 * i], impulse_adjoint[2 * i + 1]
         if state == OPEN:
             continue
-        value, tangential = impulse_adjoint[2 * i], impulse_adjoint[2 * i + 1]
         if state == STICK:
-            problem.rhs[row + 1] = tangential
+            rows[row + 1].rhs = tangential
         else:
-            value += mu[i] * tangential if state == SLIP_PLUS else -mu[i] * tangential
-        problem.rhs[row] = value
+            value += mu * tangential if state == SLIP_PLUS else -mu * tangential
+        rows[row].rhs = value
         row += 2 if state == STICK else 1
-    if not solve_linear(problem.B, problem.rhs, size):
-        problem.rhs[:size] = 0
-    w[: 2 * n] = 0
+    regular = solve_linear(work.B, rows, size)
+    w[:] = 0
     row = 0
     for i in range(n):
-        if problem.state[i] != OPEN:
-            w[2 * i] = problem.rhs[row]
+        if regular and contacts[i].state != OPEN:
+            w[2 * i] = rows[row].rhs
             row += 1
-            if problem.state[i] == STICK:
-                w[2 * i + 1] = problem.rhs[row]
+            if contacts[i].state == STICK:
+                w[2 * i + 1] = rows[row].rhs
                 row += 1
 
 
@@ -101,39 +99,39 @@ def adjoint_step(
 ) -> None:
     """Turn the adjoints of the state after the step into those before it, in place; u_bar receives the command's."""
     h = scene.dt / physics.substeps
-    C = len(p)
     n, _ = solve_step(scene, physics, q, v, p, u, work)
     if scene.support > 0:
         guess = work.velocity.copy()
-        friction = support_directions(scene, q, guess)
+        friction = support_directions(scene.facets, q, guess)
         support_mobility(scene, physics, q, v, guess, friction, work)
         assemble_problem(n, scene, physics, work)
-    give = finger_mobility(scene, physics)
-    J, D, W, finger = work.rows, work.directions, work.mobility, work.contacts.finger
-    end = v_bar + h * q_bar
-    ends = h * p_bar
-    weighted = W @ end
+    give = finger_mobility(scene.stiffness, physics.damping, h)
+    end, ends = v_bar + h * q_bar, h * p_bar
+    weighted = work.mobility @ end
     impulse_adjoint, w = np.zeros(2 * n), np.zeros(2 * n)
     for r in range(2 * n):
-        impulse_adjoint[r] = J[r, 0] * weighted[0] + J[r, 1] * weighted[1] + J[r, 2] * weighted[2]
-        if finger[r // 2] >= 0:
-            f = finger[r // 2]
-            impulse_adjoint[r] -= give * (D[r, 0] * ends[f, 0] + D[r, 1] * ends[f, 1])
+        row, f = work.rows[r], work.contacts[r // 2].finger
+        impulse_adjoint[r] = row.x * weighted[0] + row.y * weighted[1] + row.turn * weighted[2]
+        if f >= 0:
+            impulse_adjoint[r] -= give * (row.x * ends[f, 0] + row.y * ends[f, 1])
     row_multipliers(n, work, impulse_adjoint, w)
     for r in range(2 * n):
-        for d in range(3):
-            end[d] -= w[r] * J[r, d]
-        if finger[r // 2] >= 0:
-            for d in range(2):
-                ends[finger[r // 2], d] += w[r] * D[r, d]
-    z = W @ end
+        row, f = work.rows[r], work.contacts[r // 2].finger
+        end[0] -= w[r] * row.x
+        end[1] -= w[r] * row.y
+        end[2] -= w[r] * row.turn
+        if f >= 0:
+            ends[f, 0] += w[r] * row.x
+            ends[f, 1] += w[r] * row.y
+    z = work.mobility @ end
     for i in range(n):
-        _adjoint_contact(i, scene, physics, q, p, z, ends, w, q_bar, p_bar, work)
+        if work.rows[2 * i].P != 0 or w[2 * i] != 0:
+            _adjoint_contact(i, scene, physics, q, p, z, ends, w, q_bar, p_bar, work)
     if scene.support > 0:
-        q_bar[2] += _adjoint_support(scene, physics, q, z, work)
+        q_bar[2] += _adjoint_support(scene, physics, q, z, work.velocity)
     v_bar[0], v_bar[1], v_bar[2] = scene.mass * z[0], scene.mass * z[1], scene.inertia * z[2]
     follow = scene.stiffness / (scene.stiffness * h + physics.damping)
-    for c in range(C):
+    for c in range(len(p)):
         for d in range(2):
             u_bar[c, d] = follow * ends[c, d]
             p_bar[c, d] -= follow * ends[c, d]
@@ -154,81 +152,85 @@ def _adjoint_contact(
     work: Work,
 ) -> None:
     """Adjoint of contact i's rows, bias and compliance, then of its geometry."""
-    contacts, P, f = work.contacts, work.problem.P, work.contacts.finger[i]
-    if P[2 * i] == 0 and w[2 * i] == 0:
-        return
-    h, give, gap = scene.dt / physics.substeps, finger_mobility(scene, physics), contacts.gap[i]
-    soft, slope = softness(gap, physics), softness_slope(gap, physics)
-    ax, ay = contacts.point[i, 0] - q[0], contacts.point[i, 1] - q[1]
-    n_bar, arm_bar = np.zeros(2), np.zeros(2)
+    contact, h = work.contacts[i], scene.dt / physics.substeps
+    f, gap = contact.finger, contact.gap
+    give = finger_mobility(scene.stiffness, physics.damping, h) if f >= 0 else 0.0
+    soft, slope = softness(gap, physics.kappa, physics.regularization), softness_slope(gap, physics)
+    ax, ay = contact.x - q[0], contact.y - q[1]
+    nx_bar, ny_bar, ax_bar, ay_bar = 0.0, 0.0, 0.0, 0.0
     gap_bar = -w[2 * i] * bias_slope(gap, h, physics)
     for part in range(2):
-        r = 2 * i + part
-        dx, dy = work.directions[r, 0], work.directions[r, 1]
-        yx, yy = P[r] * z[0] - w[r] * work.velocity[0], P[r] * z[1] - w[r] * work.velocity[1]
-        turn = P[r] * z[2] - w[r] * work.velocity[2]
-        turn -= 2 * w[r] * P[r] * soft * work.rows[r, 2] / scene.inertia
-        gap_bar -= w[r] * P[r] * slope * scale(r, scene, physics, work)
-        ex, ey = yx - turn * ay, yy + turn * ax
+        row, m = work.rows[2 * i + part], w[2 * i + part]
+        turn = row.P * z[2] - m * work.velocity[2] - 2 * m * row.P * soft * row.turn / scene.inertia
+        gap_bar -= m * row.P * slope * contact_scale(scene.mass, scene.inertia, row.turn, give)
+        ex = row.P * z[0] - m * work.velocity[0] - turn * ay
+        ey = row.P * z[1] - m * work.velocity[1] + turn * ax
         if f >= 0:
-            ex += w[r] * work.finger_velocity[f, 0] - give * P[r] * ends[f, 0]
-            ey += w[r] * work.finger_velocity[f, 1] - give * P[r] * ends[f, 1]
-        arm_bar[0] += turn * dy
-        arm_bar[1] -= turn * dx
-        if part == 0:
-            n_bar[0] += ex
-            n_bar[1] += ey
-        else:
-            n_bar[0] += ey
-            n_bar[1] -= ex
-    q_bar[0] -= arm_bar[0]
-    q_bar[1] -= arm_bar[1]
-    _adjoint_geometry(i, scene, physics, q, p, n_bar, arm_bar, gap_bar, q_bar, p_bar, work)
+            ex += m * work.finger_velocity[f, 0] - give * row.P * ends[f, 0]
+            ey += m * work.finger_velocity[f, 1] - give * row.P * ends[f, 1]
+        ax_bar += turn * row.y
+        ay_bar -= turn * row.x
+        # The tangent is the normal turned by 90 degrees.
+        nx_bar += ex if part == 0 else ey
+        ny_bar += ey if part == 0 else -ex
+    q_bar[0] -= ax_bar
+    q_bar[1] -= ay_bar
+    _adjoint_geometry(
+        contact,
+        scene.facets[contact.feature],
+        physics.radius,
+        q,
+        p,
+        nx_bar,
+        ny_bar,
+        ax_bar,
+        ay_bar,
+        gap_bar,
+        q_bar,
+        p_bar,
+    )
 
 
 @njit(cache=True)
 def _adjoint_geometry(
-    i: int,
-    scene: View,
-    physics: Physics,
+    contact: np.record,
+    facet: np.record,
+    radius: float,
     q: np.ndarray,
     p: np.ndarray,
-    n_bar: np.ndarray,
-    c_bar: np.ndarray,
+    nx_bar: float,
+    ny_bar: float,
+    cx_bar: float,
+    cy_bar: float,
     gap_bar: float,
     q_bar: np.ndarray,
     p_bar: np.ndarray,
-    work: Work,
 ) -> None:
     """Adjoint of normal, contact point and gap with respect to the object's pose and the finger."""
-    contacts = work.contacts
-    k, f = contacts.feature[i], contacts.finger[i]
-    cs, sn = np.cos(q[2]), np.sin(q[2])
-    rx, ry = vertex_arm(scene, k, cs, sn)
-    if contacts.kind[i] == WALL:
-        gx, gy = c_bar[0] + gap_bar * contacts.normal[i, 0], c_bar[1] + gap_bar * contacts.normal[i, 1]
-        _to_pose(gx, gy, rx, ry, q_bar)
+    rx, ry = vertex_arm(facet.x, facet.y, np.cos(q[2]), np.sin(q[2]))
+    if contact.kind == WALL:
+        _to_pose(cx_bar + gap_bar * contact.nx, cy_bar + gap_bar * contact.ny, rx, ry, q_bar)
         return
-    ox, oy = -contacts.normal[i, 0], -contacts.normal[i, 1]
+    f, ox, oy = contact.finger, -contact.nx, -contact.ny
     sx, sy = p[f, 0] - q[0] - rx, p[f, 1] - q[1] - ry
-    if contacts.kind[i] == FACET:
-        distance = contacts.gap[i] + physics.radius
-        distance_bar = gap_bar - c_bar[0] * ox - c_bar[1] * oy
-        mx = distance_bar * sx - n_bar[0] - distance * c_bar[0]
-        my = distance_bar * sy - n_bar[1] - distance * c_bar[1]
-        p_bar[f, 0] += c_bar[0] + distance_bar * ox
-        p_bar[f, 1] += c_bar[1] + distance_bar * oy
+    if contact.kind == FACET:
+        distance = contact.gap + radius
+        distance_bar = gap_bar - cx_bar * ox - cy_bar * oy
+        mx = distance_bar * sx - nx_bar - distance * cx_bar
+        my = distance_bar * sy - ny_bar - distance * cy_bar
+        p_bar[f, 0] += cx_bar + distance_bar * ox
+        p_bar[f, 1] += cy_bar + distance_bar * oy
         _to_pose(-distance_bar * ox, -distance_bar * oy, rx, ry, q_bar)
         q_bar[2] += my * ox - mx * oy
         return
-    sign, reach = contacts.sign[i], np.hypot(sx, sy)
+    sign, reach = 1 - 2 * facet.reflex, np.sqrt(sx * sx + sy * sy)
     ex, ey = sx / reach, sy / reach
-    along = -n_bar[0] * ex - n_bar[1] * ey
-    gx = sign * ((-n_bar[0] - along * ex) / reach + gap_bar * ex)
-    gy = sign * ((-n_bar[1] - along * ey) / reach + gap_bar * ey)
+    along = -nx_bar * ex - ny_bar * ey
+    gx = sign * ((-nx_bar - along * ex) / reach + gap_bar * ex)
+    gy = sign * ((-ny_bar - along * ey) / reach + gap_bar * ey)
     p_bar[f, 0] += gx
     p_bar[f, 1] += gy
-    _to_pose(c_bar[0] - gx, c_bar[1] - gy, rx, ry, q_bar)
+    _to_pose(cx_bar - gx, cy_bar - gy, rx, ry, q_bar)
 
 
 @njit(cache=True)
@@ -240,13 +242,13 @@ def _to_pose(gx: float, gy: float, rx: float, ry: float, q_bar: np.ndarray) -> N
 
 
 @njit(cache=True)
-def _adjoint_support(scene: View, physics: Physics, q: np.ndarray, z: np.ndarray, work: Work) -> float:
+def _adjoint_support(scene: View, physics: Physics, q: np.ndarray, z: np.ndarray, v: np.ndarray) -> float:
     """Derivative of the support friction's impulse along z with respect to the object's angle."""
-    h, v = scene.dt / physics.substeps, work.velocity
+    h = scene.dt / physics.substeps
     cs, sn = np.cos(q[2]), np.sin(q[2])
     total = 0.0
-    for k in range(len(scene.vertices)):
-        rx, ry = vertex_arm(scene, k, cs, sn)
+    for k in range(len(scene.facets)):
+        rx, ry = vertex_arm(scene.facets[k].x, scene.facets[k].y, cs, sn)
         sx, sy = v[0] - v[2] * ry, v[1] + v[2] * rx
         speed = np.sqrt(sx * sx + sy * sy + SUPPORT_CREEP**2)
         viscous = h * scene.support / speed

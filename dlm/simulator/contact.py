@@ -1,8 +1,6 @@
-"""Which features touch: fingers against the polygon, polygon vertices against walls, and how contacts move.
+"""Which features touch: fingers against the polygon, and polygon vertices against walls.
 
-A contact has a unit direction `normal` along which its force pushes the object, a `point` where the force acts and a
-signed `gap`.  Row 2 i of the contact Jacobian is the normal direction of contact i, row 2 i + 1 the tangent, the normal
-turned by +90 degrees.
+A contact has a unit direction n along which its force pushes the object, a point where the force acts and a signed gap.
 """
 
 from typing import NamedTuple
@@ -14,6 +12,11 @@ from dlm.simulator.scene import SceneArrays
 from dlm.simulator.settings import Physics
 
 FACET, VERTEX, WALL = 0, 1, 2
+CONTACT = np.dtype(
+    [(name, "i8") for name in ("kind", "finger", "feature", "wall", "state")]
+    + [(name, "f8") for name in ("nx", "ny", "x", "y", "gap", "friction")]
+)
+"""kind; finger or -1; feature: facet, vertex or a wall's vertex; wall or -1; state: see `lcp`; n; point; gap; friction."""
 WALL_POINTS = 4
 """At most this many vertices touch one wall."""
 REACH = 2e-3
@@ -22,69 +25,32 @@ LEAST_ACTIVATION = 1e-6
 
 
 class View(NamedTuple):
-    """One scene without its padding."""
+    """One scene without its padding.  Few arrays: passing one costs as much as ten multiplications."""
 
-    vertices: np.ndarray
-    outward: np.ndarray
-    length: np.ndarray
-    reflex: np.ndarray
+    facets: np.ndarray
+    walls: np.ndarray
     mass: float
     inertia: float
     friction: float
     stiffness: float
     gravity: float
     support: float
-    walls: np.ndarray
     dt: float
-
-
-class Contacts(NamedTuple):
-    """Work space for at most n contacts; `finger` is -1 for walls, `feature` a facet, a vertex or a wall's vertex."""
-
-    kind: np.ndarray
-    finger: np.ndarray
-    feature: np.ndarray
-    sign: np.ndarray
-    normal: np.ndarray
-    point: np.ndarray
-    gap: np.ndarray
-    friction: np.ndarray
-    wall: np.ndarray
 
 
 @njit(cache=True)
 def view(scenes: SceneArrays, b: int) -> View:
     """Scene b of a batch."""
-    n = scenes.vertex_count[b]
     return View(
-        scenes.vertices[b, :n],
-        scenes.outward[b, :n],
-        scenes.length[b, :n],
-        scenes.reflex[b, :n],
+        scenes.facets[b, : scenes.vertex_count[b]],
+        scenes.walls[b, : scenes.wall_count[b]],
         scenes.mass[b],
         scenes.inertia[b],
         scenes.friction[b],
         scenes.stiffness[b],
         scenes.gravity[b],
         scenes.support[b],
-        scenes.walls[b, : scenes.wall_count[b]],
         scenes.dt[b],
-    )
-
-
-@njit(cache=True)
-def contacts_for(size: int) -> Contacts:
-    """Empty work space."""
-    return Contacts(
-        np.zeros(size, np.int64),
-        np.zeros(size, np.int64),
-        np.zeros(size, np.int64),
-        np.zeros(size),
-        np.zeros((size, 2)),
-        np.zeros((size, 2)),
-        np.zeros(size),
-        np.zeros(size),
-        np.zeros(size, np.int64),
     )
 
 
@@ -97,29 +63,29 @@ def activation(gap: float, kappa: float) -> float:
 
 
 @njit(cache=True)
-def nearest(scene: View, x: float, y: float) -> tuple[int, int, float, float]:
-    """Feature of the boundary nearest to a body point: kind, index, signed distance, coordinate along the facet."""
-    n = len(scene.vertices)
-    best, kind, index, side, where = np.inf, FACET, 0, 1.0, 0.0
+def nearest(facets: np.ndarray, x: float, y: float) -> tuple[int, int, float]:
+    """Feature of the boundary nearest to a body point: kind, index, signed distance (negative inside)."""
+    n = len(facets)
+    best, kind, index, side = np.inf, FACET, 0, 1.0
     for k in range(n):
-        dx, dy = x - scene.vertices[k, 0], y - scene.vertices[k, 1]
-        nx, ny = scene.outward[k, 0], scene.outward[k, 1]
-        height, along = dx * nx + dy * ny, dy * nx - dx * ny
-        beyond = along - scene.length[k]
-        if along < 0 or beyond > 0:
-            off = along if along < 0 else beyond
-            square = height * height + off * off
-            if square < best and square > 1e-24:
-                best, kind, side = square, VERTEX, 1.0
-                index = k if along < 0 else (k + 1) % n
-                if scene.reflex[index]:
-                    side = -1.0
-                continue
+        dx, dy = x - facets[k].x, y - facets[k].y
+        height = dx * facets[k].ox + dy * facets[k].oy
+        along = dy * facets[k].ox - dx * facets[k].oy
+        beyond = along - facets[k].length
         square = height * height
-        if square <= best and along >= 0 and beyond <= 0:
-            best, kind, index, where = square, FACET, k, along
-            side = 1.0 if height >= 0 else -1.0
-    return kind, index, side * np.sqrt(best), where
+        if along >= 0 and beyond <= 0:
+            if square <= best:
+                best, kind, index = square, FACET, k
+                side = 1.0 if height >= 0 else -1.0
+            continue
+        off = along if along < 0 else beyond
+        square += off * off
+        if 1e-24 < square < best:
+            best, kind = square, VERTEX
+            index = k if along < 0 else (k + 1) % n
+            # Nearest to a convex vertex only points outside are, nearest to a reflex one only points inside.
+            side = 1.0 - 2.0 * facets[index].reflex
+    return kind, index, side * np.sqrt(best)
 
 
 @njit(cache=True)
@@ -130,75 +96,50 @@ def collect(
     velocity: np.ndarray,
     fingers: np.ndarray,
     finger_velocity: np.ndarray,
-    out: Contacts,
+    out: np.ndarray,
 ) -> int:
-    """Fill `out` with the contacts that may act during the next step; return their number."""
+    """Fill `out`, an array of CONTACT, with those that may act during the next step; return their number."""
     cs, sn = np.cos(pose[2]), np.sin(pose[2])
-    h = scene.dt / physics.substeps
     n = 0
     for c in range(len(fingers)):
-        n = _finger_contacts(scene, physics, pose, cs, sn, velocity, fingers, finger_velocity, c, h, out, n)
+        dx, dy = fingers[c, 0] - pose[0], fingers[c, 1] - pose[1]
+        bx, by = cs * dx + sn * dy, cs * dy - sn * dx
+        kind, index, _ = nearest(scene.facets, bx, by)
+        n = _add_finger(
+            scene, physics, pose, cs, sn, velocity, fingers, finger_velocity, c, kind, index, out, n
+        )
+        if kind == FACET:
+            other = _second_facet(scene.facets, index, bx, by)
+            if other >= 0:
+                n = _add_finger(
+                    scene, physics, pose, cs, sn, velocity, fingers, finger_velocity, c, FACET, other, out, n
+                )
     for w in range(len(scene.walls)):
-        n = _wall_contacts(scene, physics, pose, cs, sn, velocity, w, h, out, n)
+        n = _add_wall(scene, physics, pose, cs, sn, velocity, w, out, n)
     return n
 
 
 @njit(cache=True)
-def _acts(gap: float, closing: float, h: float, kappa: float) -> bool:
+def _second_facet(facets: np.ndarray, index: int, x: float, y: float) -> int:
+    """Facet beyond a reflex end of facet `index` that a point faces too; -1 if there is none."""
+    count = len(facets)
+    for step in (0, 1):
+        corner = (index + step) % count
+        if facets[corner].reflex > 0:
+            other = (index - 1) % count if step == 0 else corner
+            dx, dy = x - facets[other].x, y - facets[other].y
+            along = dy * facets[other].ox - dx * facets[other].oy
+            if 0 <= along <= facets[other].length:
+                return other
+    return -1
+
+
+@njit(cache=True)
+def _acts(gap: float, approach: float, kappa: float) -> bool:
+    """Whether a contact can matter that closes by `approach` during the step."""
     if np.isinf(kappa):
-        return gap + h * closing < REACH
+        return gap - approach < REACH
     return activation(gap, kappa) > LEAST_ACTIVATION
-
-
-@njit(cache=True)
-def _finger_contacts(
-    scene: View,
-    physics: Physics,
-    pose: np.ndarray,
-    cs: float,
-    sn: float,
-    velocity: np.ndarray,
-    fingers: np.ndarray,
-    finger_velocity: np.ndarray,
-    c: int,
-    h: float,
-    out: Contacts,
-    n: int,
-) -> int:
-    """The nearest feature, and beside a reflex vertex the neighbouring facet too."""
-    dx, dy = fingers[c, 0] - pose[0], fingers[c, 1] - pose[1]
-    bx, by = cs * dx + sn * dy, cs * dy - sn * dx
-    kind, index, _, _ = nearest(scene, bx, by)
-    first = n
-    n = _add_finger(
-        scene, physics, pose, cs, sn, velocity, fingers, finger_velocity, c, h, kind, index, out, n
-    )
-    if kind == FACET:
-        count = len(scene.vertices)
-        for step in (0, 1):
-            corner = (index + step) % count
-            if scene.reflex[corner]:
-                other = (index - 1) % count if step == 0 else corner
-                ex, ey = bx - scene.vertices[other, 0], by - scene.vertices[other, 1]
-                along = ey * scene.outward[other, 0] - ex * scene.outward[other, 1]
-                if 0 <= along <= scene.length[other] and n <= first + 1:
-                    n = _add_finger(
-                        scene,
-                        physics,
-                        pose,
-                        cs,
-                        sn,
-                        velocity,
-                        fingers,
-                        finger_velocity,
-                        c,
-                        h,
-                        FACET,
-                        other,
-                        out,
-                        n,
-                    )
-    return n
 
 
 @njit(cache=True)
@@ -212,41 +153,39 @@ def _add_finger(
     fingers: np.ndarray,
     finger_velocity: np.ndarray,
     c: int,
-    h: float,
     kind: int,
     index: int,
-    out: Contacts,
+    out: np.ndarray,
     n: int,
 ) -> int:
     """Contact of finger c with one feature, unless it is out of reach."""
-    vx, vy = scene.vertices[index, 0], scene.vertices[index, 1]
+    facet = scene.facets[index]
     px, py = fingers[c, 0], fingers[c, 1]
-    ax, ay = pose[0] + cs * vx - sn * vy, pose[1] + sn * vx + cs * vy
+    ax, ay = pose[0] + cs * facet.x - sn * facet.y, pose[1] + sn * facet.x + cs * facet.y
     if kind == FACET:
-        ox, oy = scene.outward[index, 0], scene.outward[index, 1]
-        nx, ny, sign = cs * ox - sn * oy, sn * ox + cs * oy, 1.0
+        nx, ny = cs * facet.ox - sn * facet.oy, sn * facet.ox + cs * facet.oy
         distance = (px - ax) * nx + (py - ay) * ny
         qx, qy = px - distance * nx, py - distance * ny
     else:
-        sign = -1.0 if scene.reflex[index] else 1.0
-        reach = np.hypot(px - ax, py - ay)
+        sign = 1 - 2 * facet.reflex
+        reach = np.sqrt((px - ax) ** 2 + (py - ay) ** 2)
         nx, ny = sign * (px - ax) / reach, sign * (py - ay) / reach
         distance, qx, qy = sign * reach, ax, ay
     gap = distance - physics.radius
     ux = velocity[0] - velocity[2] * (qy - pose[1]) - finger_velocity[c, 0]
     uy = velocity[1] + velocity[2] * (qx - pose[0]) - finger_velocity[c, 1]
-    if not _acts(gap, -(nx * ux + ny * uy), h, physics.kappa):
+    if not _acts(gap, scene.dt / physics.substeps * (nx * ux + ny * uy), physics.kappa):
         return n
-    out.kind[n], out.finger[n], out.feature[n], out.sign[n], out.wall[n] = kind, c, index, sign, -1
+    contact = out[n]
+    contact.kind, contact.finger, contact.feature, contact.wall = kind, c, index, -1
     # The finger pushes the object inwards, against the outward normal.
-    out.normal[n, 0], out.normal[n, 1] = -nx, -ny
-    out.point[n, 0], out.point[n, 1] = qx, qy
-    out.gap[n], out.friction[n] = gap, scene.friction
+    contact.nx, contact.ny, contact.x, contact.y = -nx, -ny, qx, qy
+    contact.gap, contact.friction = gap, scene.friction
     return n + 1
 
 
 @njit(cache=True)
-def _wall_contacts(
+def _add_wall(
     scene: View,
     physics: Physics,
     pose: np.ndarray,
@@ -254,30 +193,31 @@ def _wall_contacts(
     sn: float,
     velocity: np.ndarray,
     w: int,
-    h: float,
-    out: Contacts,
+    out: np.ndarray,
     n: int,
 ) -> int:
     """The lowest vertices over wall w."""
-    wall = scene.walls[w]
-    nx, ny = wall[2], wall[3]
-    base = n
-    for k in range(len(scene.vertices)):
-        vx, vy = scene.vertices[k, 0], scene.vertices[k, 1]
+    wall, base, h = scene.walls[w], n, scene.dt / physics.substeps
+    nx, ny = wall.nx, wall.ny
+    for k in range(len(scene.facets)):
+        vx, vy = scene.facets[k].x, scene.facets[k].y
         rx, ry = cs * vx - sn * vy, sn * vx + cs * vy
-        gap = (pose[0] + rx - wall[0]) * nx + (pose[1] + ry - wall[1]) * ny
-        closing = nx * (velocity[0] - velocity[2] * ry) + ny * (velocity[1] + velocity[2] * rx)
-        if not _acts(gap, closing, h, physics.kappa):
+        gap = (pose[0] + rx - wall.x) * nx + (pose[1] + ry - wall.y) * ny
+        opening = nx * (velocity[0] - velocity[2] * ry) + ny * (velocity[1] + velocity[2] * rx)
+        if not _acts(gap, -h * opening, physics.kappa):
             continue
         at = n
         if n - base == WALL_POINTS:
-            at = base + int(np.argmax(out.gap[base:n]))
-            if out.gap[at] <= gap:
+            at = base
+            for i in range(base + 1, n):
+                if out[i].gap > out[at].gap:
+                    at = i
+            if out[at].gap <= gap:
                 continue
         else:
             n += 1
-        out.kind[at], out.finger[at], out.feature[at], out.sign[at], out.wall[at] = WALL, -1, k, 1.0, w
-        out.normal[at, 0], out.normal[at, 1] = nx, ny
-        out.point[at, 0], out.point[at, 1] = pose[0] + rx, pose[1] + ry
-        out.gap[at], out.friction[at] = gap, wall[4]
+        contact = out[at]
+        contact.kind, contact.finger, contact.feature, contact.wall = WALL, -1, k, w
+        contact.nx, contact.ny, contact.x, contact.y = nx, ny, pose[0] + rx, pose[1] + ry
+        contact.gap, contact.friction = gap, wall.friction
     return n

@@ -142,12 +142,12 @@ def _stand_off(
     cs, sn = np.cos(pose[2]), np.sin(pose[2])
     dx, dy = position[0] - pose[0], position[1] - pose[1]
     bx, by = cs * dx + sn * dy, cs * dy - sn * dx
-    kind, index, distance, _ = nearest(scene, bx, by)
+    kind, index, distance = nearest(scene.facets, bx, by)
     at_vertex = kind == VERTEX and abs(distance) > 1e-9
     if at_vertex:
-        nx, ny = (bx - scene.vertices[index, 0]) / distance, (by - scene.vertices[index, 1]) / distance
+        nx, ny = (bx - scene.facets[index].x) / distance, (by - scene.facets[index].y) / distance
     else:
-        nx, ny = scene.outward[index, 0], scene.outward[index, 1]
+        nx, ny = scene.facets[index].ox, scene.facets[index].oy
     if layers.screw:
         normal[0], normal[1] = nx, ny
     else:

@@ -4,8 +4,6 @@ With y = A P + c: y_n >= 0, P_n >= 0, y_n P_n = 0; y_t = 0 where |P_t| < mu P_n,
 A few projected Gauss-Seidel sweeps guess the state of every contact; an active-set Newton method makes it exact.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 
@@ -18,203 +16,179 @@ NEWTON = 12
 FALLBACK_SWEEPS = 200
 
 
-class Complementarity(NamedTuple):
-    """A (m, m), c (m,), P (m,), states (m / 2,) and the reduced linear system of the active set."""
-
-    A: np.ndarray
-    c: np.ndarray
-    P: np.ndarray
-    state: np.ndarray
-    B: np.ndarray
-    rhs: np.ndarray
-    saved: np.ndarray
+ROW = np.dtype([(name, "f8") for name in ("x", "y", "turn", "c", "P", "rhs", "saved")])
+"""Row of the problem: direction and lever (the contact Jacobian), c, impulse, and scratch for the linear system."""
 
 
 @njit(cache=True)
-def complementarity_for(contacts: int) -> Complementarity:
-    """Empty work space."""
-    m = 2 * contacts
-    return Complementarity(
-        np.zeros((m, m)),
-        np.zeros(m),
-        np.zeros(m),
-        np.zeros(contacts, np.int64),
-        np.zeros((m, m)),
-        np.zeros(m),
-        np.zeros(m),
-    )
-
-
-@njit(cache=True)
-def solve_contacts(n: int, w: Complementarity, mu: np.ndarray) -> bool:
-    """Solve for w.P with n contacts; w.state holds the active set.  False where only the sweeps' answer was found."""
-    w.P[: 2 * n] = 0
-    sweep(n, w, mu, SWEEPS)
-    if newton(n, w, mu):
+def solve_contacts(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray, B: np.ndarray) -> bool:
+    """Solve for the impulses with n contacts; contacts.state holds the active set.  False where only the sweeps' answer was found."""
+    for r in range(2 * n):
+        rows[r].P = 0
+    sweep(n, contacts, rows, A, SWEEPS)
+    if newton(n, contacts, rows, A, B):
         return True
-    w.P[: 2 * n] = 0
-    sweep(n, w, mu, FALLBACK_SWEEPS)
-    w.saved[: 2 * n] = w.P[: 2 * n]
-    if newton(n, w, mu):
+    for r in range(2 * n):
+        rows[r].P = 0
+    sweep(n, contacts, rows, A, FALLBACK_SWEEPS)
+    for r in range(2 * n):
+        rows[r].saved = rows[r].P
+    if newton(n, contacts, rows, A, B):
         return True
-    w.P[: 2 * n] = w.saved[: 2 * n]
-    guess_states(n, w, mu)
+    for r in range(2 * n):
+        rows[r].P = rows[r].saved
+    guess_states(n, contacts, rows)
     return False
 
 
 @njit(cache=True)
-def sweep(n: int, w: Complementarity, mu: np.ndarray, sweeps: int) -> None:
+def sweep(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray, sweeps: int) -> None:
     """Projected Gauss-Seidel, contact by contact."""
     m = 2 * n
     for _ in range(sweeps):
         for i in range(n):
             for r in (2 * i, 2 * i + 1):
-                y = w.c[r]
+                y = rows[r].c
                 for s in range(m):
-                    y += w.A[r, s] * w.P[s]
-                p = w.P[r] - y / w.A[r, r]
+                    y += A[r, s] * rows[s].P
+                p = rows[r].P - y / A[r, r]
                 if r == 2 * i:
-                    w.P[r] = max(p, 0.0)
+                    rows[r].P = max(p, 0.0)
                 else:
-                    limit = mu[i] * w.P[2 * i]
-                    w.P[r] = min(max(p, -limit), limit)
+                    limit = contacts[i].friction * rows[2 * i].P
+                    rows[r].P = min(max(p, -limit), limit)
 
 
 @njit(cache=True)
-def guess_states(n: int, w: Complementarity, mu: np.ndarray) -> None:
+def guess_states(n: int, contacts: np.ndarray, rows: np.ndarray) -> None:
     """Read the states off the impulses."""
     for i in range(n):
-        normal, tangential = w.P[2 * i], w.P[2 * i + 1]
-        limit = mu[i] * normal
+        normal, tangential = rows[2 * i].P, rows[2 * i + 1].P
+        limit = contacts[i].friction * normal
         if normal <= 0:
-            w.state[i] = OPEN
+            contacts[i].state = OPEN
         elif tangential >= limit:
-            w.state[i] = SLIP_PLUS
+            contacts[i].state = SLIP_PLUS
         elif tangential <= -limit:
-            w.state[i] = SLIP_MINUS
+            contacts[i].state = SLIP_MINUS
         else:
-            w.state[i] = STICK
+            contacts[i].state = STICK
 
 
 @njit(cache=True)
-def newton(n: int, w: Complementarity, mu: np.ndarray) -> bool:
+def newton(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray, B: np.ndarray) -> bool:
     """Solve the linear system of the guessed states and correct them until they agree with their solution."""
-    guess_states(n, w, mu)
+    guess_states(n, contacts, rows)
     for _ in range(NEWTON):
-        size = reduced_system(n, w, mu, False)
+        size = reduced_system(n, contacts, rows, A, B, False)
         for r in range(size):
-            w.rhs[r] = -w.rhs[r]
-        if not solve_linear(w.B, w.rhs, size):
+            rows[r].rhs = -rows[r].rhs
+        if not solve_linear(B, rows, size):
             return False
-        expand(n, w, mu)
-        if not _correct_states(n, w, mu):
+        expand(n, contacts, rows)
+        if not _correct_states(n, contacts, rows, A):
             return True
     return False
 
 
 @njit(cache=True)
-def reduced_system(n: int, w: Complementarity, mu: np.ndarray, transposed: bool) -> int:
-    """Rows and columns of the active set into w.B, its part of c into w.rhs; return the size.
+def reduced_system(
+    n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray, B: np.ndarray, transposed: bool
+) -> int:
+    """Rows and columns of the active set into B, its part of c into the right-hand sides; return the size.
 
     A closed contact has a normal row; a sticking one has a tangential row too.  The column of a slipping contact
     carries its friction: A_n +- mu A_t.
     """
     row = 0
     for i in range(n):
-        for part in range(ROWS[w.state[i]]):
+        for part in range(ROWS[contacts[i].state]):
             r = 2 * i + part
             column = 0
             for j in range(n):
-                state = w.state[j]
+                state = contacts[j].state
                 if state == OPEN:
                     continue
-                value = w.A[r, 2 * j]
+                mu = 0.0 if state == STICK else contacts[j].friction * (1 if state == SLIP_PLUS else -1)
+                B[row, column] = A[r, 2 * j] + mu * A[r, 2 * j + 1]
+                column += 1
                 if state == STICK:
-                    _put(w.B, row, column + 1, w.A[r, 2 * j + 1], transposed)
-                elif state == SLIP_PLUS:
-                    value += mu[j] * w.A[r, 2 * j + 1]
-                else:
-                    value -= mu[j] * w.A[r, 2 * j + 1]
-                _put(w.B, row, column, value, transposed)
-                column += 2 if state == STICK else 1
-            w.rhs[row] = w.c[r]
+                    B[row, column] = A[r, 2 * j + 1]
+                    column += 1
+            rows[row].rhs = rows[r].c
             row += 1
+    if transposed:
+        for r in range(row):
+            for s in range(r):
+                B[r, s], B[s, r] = B[s, r], B[r, s]
     return row
 
 
-@njit(cache=True, inline="always")
-def _put(B: np.ndarray, r: int, s: int, value: float, transposed: bool) -> None:
-    if transposed:
-        B[s, r] = value
-    else:
-        B[r, s] = value
-
-
 @njit(cache=True)
-def expand(n: int, w: Complementarity, mu: np.ndarray) -> None:
-    """Impulses P from the reduced solution in w.rhs."""
+def expand(n: int, contacts: np.ndarray, rows: np.ndarray) -> None:
+    """Impulses P from the reduced solution in the right-hand sides."""
     row = 0
     for i in range(n):
-        state = w.state[i]
+        state = contacts[i].state
         if state == OPEN:
-            w.P[2 * i] = w.P[2 * i + 1] = 0.0
+            rows[2 * i].P = rows[2 * i + 1].P = 0.0
             continue
-        w.P[2 * i] = w.rhs[row]
+        rows[2 * i].P = rows[row].rhs
         if state == STICK:
-            w.P[2 * i + 1] = w.rhs[row + 1]
+            rows[2 * i + 1].P = rows[row + 1].rhs
             row += 1
         elif state == SLIP_PLUS:
-            w.P[2 * i + 1] = mu[i] * w.rhs[row]
+            rows[2 * i + 1].P = contacts[i].friction * rows[row].rhs
         else:
-            w.P[2 * i + 1] = -mu[i] * w.rhs[row]
+            rows[2 * i + 1].P = -contacts[i].friction * rows[row].rhs
         row += 1
 
 
 @njit(cache=True)
-def _correct_states(n: int, w: Complementarity, mu: np.ndarray) -> bool:
-    """Flip the states that contradict w.P; return whether any did."""
+def _correct_states(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray) -> bool:
+    """Flip the states that contradict the impulses; return whether any did."""
     m = 2 * n
     impulse, speed = 0.0, 0.0
     for r in range(m):
-        impulse = max(impulse, abs(w.P[r]))
-        speed = max(speed, abs(w.c[r]))
+        impulse = max(impulse, abs(rows[r].P))
+        speed = max(speed, abs(rows[r].c))
     impulse_tolerance, speed_tolerance = 1e-11 * impulse, 1e-11 * speed
     changed = False
     for i in range(n):
-        state, normal, tangential = w.state[i], w.P[2 * i], w.P[2 * i + 1]
+        state, normal, tangential = contacts[i].state, rows[2 * i].P, rows[2 * i + 1].P
         new = state
         if state == OPEN:
-            if _velocity(w, 2 * i, m) < -speed_tolerance:
+            if _velocity(rows, A, 2 * i, m) < -speed_tolerance:
                 new = STICK
         elif normal < -impulse_tolerance:
             new = OPEN
         elif state == STICK:
-            limit = mu[i] * max(normal, 0.0) + impulse_tolerance
+            limit = contacts[i].friction * max(normal, 0.0) + impulse_tolerance
             if tangential > limit:
                 new = SLIP_PLUS
             elif tangential < -limit:
                 new = SLIP_MINUS
-        elif mu[i] > 0:
-            slip = _velocity(w, 2 * i + 1, m)
+        elif contacts[i].friction > 0:
+            slip = _velocity(rows, A, 2 * i + 1, m)
             if (state == SLIP_PLUS and slip > speed_tolerance) or (
                 state == SLIP_MINUS and slip < -speed_tolerance
             ):
                 new = STICK
         if new != state:
-            w.state[i], changed = new, True
+            contacts[i].state, changed = new, True
     return changed
 
 
 @njit(cache=True)
-def _velocity(w: Complementarity, r: int, m: int) -> float:
-    y = w.c[r]
+def _velocity(rows: np.ndarray, A: np.ndarray, r: int, m: int) -> float:
+    y = rows[r].c
     for s in range(m):
-        y += w.A[r, s] * w.P[s]
+        y += A[r, s] * rows[s].P
     return y
 
 
 @njit(cache=True)
-def solve_linear(B: np.ndarray, x: np.ndarray, size: int) -> bool:
+def solve_linear(B: np.ndarray, rows: np.ndarray, size: int) -> bool:
     """Gaussian elimination with partial pivoting, in place; False for a singular matrix."""
     for k in range(size):
         pivot = k
@@ -226,15 +200,15 @@ def solve_linear(B: np.ndarray, x: np.ndarray, size: int) -> bool:
         if pivot != k:
             for s in range(k, size):
                 B[k, s], B[pivot, s] = B[pivot, s], B[k, s]
-            x[k], x[pivot] = x[pivot], x[k]
+            rows[k].rhs, rows[pivot].rhs = rows[pivot].rhs, rows[k].rhs
         for r in range(k + 1, size):
             factor = B[r, k] / B[k, k]
             if factor != 0:
                 for s in range(k + 1, size):
                     B[r, s] -= factor * B[k, s]
-                x[r] -= factor * x[k]
+                rows[r].rhs -= factor * rows[k].rhs
     for k in range(size - 1, -1, -1):
         for s in range(k + 1, size):
-            x[k] -= B[k, s] * x[s]
-        x[k] /= B[k, k]
+            rows[k].rhs -= B[k, s] * rows[s].rhs
+        rows[k].rhs /= B[k, k]
     return True

@@ -179,33 +179,32 @@ def _trace(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Contacts (n, 9) as in ContactTrace, the two residuals, work of the fingers (S,)."""
     S, h = len(commands) - 1, scene.dt / physics.substeps
-    rows, laws, finger_work = np.zeros((S * len(work.contacts.gap), 9)), np.zeros(2), np.zeros(S)
+    out, laws, finger_work = np.zeros((S * len(work.contacts), 9)), np.zeros(2), np.zeros(S)
     count = 0
     for i in range(S):
         q, v, p = motion.poses[i], motion.velocities[i], motion.fingers[i]
         n, _ = solve_step(scene, physics, q, v, p, commands[i + 1], work)
         _residuals(n, scene, physics, q, v, motion.velocities[i + 1], p, commands[i + 1], work, laws)
         for k in range(n):
-            P = work.problem.P[2 * k : 2 * k + 2]
-            if P[0] == 0 and P[1] == 0:
+            contact, normal, tangent = work.contacts[k], work.rows[2 * k], work.rows[2 * k + 1]
+            if normal.P == 0 and tangent.P == 0:
                 continue
-            nx, ny = work.contacts.normal[k, 0], work.contacts.normal[k, 1]
-            fx, fy = (P[0] * nx - P[1] * ny) / h, (P[0] * ny + P[1] * nx) / h
-            f, tangent = work.contacts.finger[k], work.rows[2 * k + 1]
-            slip = (
-                tangent[0] * work.velocity[0] + tangent[1] * work.velocity[1] + tangent[2] * work.velocity[2]
+            fx, fy = (
+                (normal.P * normal.x + tangent.P * tangent.x) / h,
+                (normal.P * normal.y + tangent.P * tangent.y) / h,
             )
+            after, f = work.velocity, contact.finger
+            slip = tangent.x * after[0] + tangent.y * after[1] + tangent.turn * after[2]
             if f >= 0:
-                slip -= tangent[0] * work.finger_velocity[f, 0] + tangent[1] * work.finger_velocity[f, 1]
-                ax, ay = work.contacts.point[k, 0] - q[0], work.contacts.point[k, 1] - q[1]
-                mid = 0.5 * (v + work.velocity)
-                finger_work[i] += h * (fx * mid[0] + fy * mid[1] + (ax * fy - ay * fx) * mid[2])
-            rows[count, 0], rows[count, 1], rows[count, 2] = i, f, work.contacts.wall[k]
-            rows[count, 3:5] = work.contacts.point[k]
-            rows[count, 5], rows[count, 6] = fx, fy
-            rows[count, 7], rows[count, 8] = work.contacts.gap[k], slip
+                slip -= tangent.x * work.finger_velocity[f, 0] + tangent.y * work.finger_velocity[f, 1]
+                turn = (normal.P * normal.turn + tangent.P * tangent.turn) / h
+                mid = 0.5 * (v + after)
+                finger_work[i] += h * (fx * mid[0] + fy * mid[1] + turn * mid[2])
+            out[count, 0], out[count, 1], out[count, 2] = i, f, contact.wall
+            out[count, 3], out[count, 4], out[count, 5], out[count, 6] = contact.x, contact.y, fx, fy
+            out[count, 7], out[count, 8] = contact.gap, slip
             count += 1
-    return rows[:count], laws, finger_work
+    return out[:count], laws, finger_work
 
 
 @njit(cache=True)
@@ -236,21 +235,19 @@ def _residuals(
             drop = u[c, d] - p[c, d] - h * work.finger_velocity[c, d]
             spring[c, d] = scene.stiffness * drop - physics.damping * work.finger_velocity[c, d]
     for k in range(n):
-        Pn, Pt = work.problem.P[2 * k], work.problem.P[2 * k + 1]
-        nx, ny = work.contacts.normal[k, 0], work.contacts.normal[k, 1]
-        fx, fy = Pn * nx - Pt * ny, Pn * ny + Pt * nx
-        ax, ay = work.contacts.point[k, 0] - q[0], work.contacts.point[k, 1] - q[1]
+        contact, normal, tangent = work.contacts[k], work.rows[2 * k], work.rows[2 * k + 1]
+        fx, fy = normal.P * normal.x + tangent.P * tangent.x, normal.P * normal.y + tangent.P * tangent.y
         net[0] -= fx
         net[1] -= fy
-        net[2] -= ax * fy - ay * fx
-        if work.contacts.finger[k] >= 0:
-            spring[work.contacts.finger[k], 0] -= fx / h
-            spring[work.contacts.finger[k], 1] -= fy / h
-        cone = max(-Pn, abs(Pt) - work.contacts.friction[k] * Pn)
-        y = work.problem.c[2 * k]
+        net[2] -= (contact.x - q[0]) * fy - (contact.y - q[1]) * fx
+        if contact.finger >= 0:
+            spring[contact.finger, 0] -= fx / h
+            spring[contact.finger, 1] -= fy / h
+        cone = max(-normal.P, abs(tangent.P) - contact.friction * normal.P)
+        y = normal.c
         for s in range(2 * n):
-            y += work.problem.A[2 * k, s] * work.problem.P[s]
-        broken = abs(y) if Pn > 0 else max(-y, 0.0)
+            y += work.A[2 * k, s] * work.rows[s].P
+        broken = abs(y) if normal.P > 0 else max(-y, 0.0)
         laws[1] = max(laws[1], cone / h, broken * scene.mass / h)
     if scene.support == 0:
         laws[0] = max(laws[0], abs(net[0]) / h, abs(net[1]) / h, abs(net[2]) / (h * size))

@@ -44,19 +44,22 @@ class Scene:
         )
 
 
+FACET_ROW = np.dtype([(name, "f8") for name in ("x", "y", "ox", "oy", "length", "reflex")])
+"""A facet: start vertex, unit outward normal, length [m], and whether the start vertex is reflex (0 or 1)."""
+WALL_ROW = np.dtype([(name, "f8") for name in ("x", "y", "nx", "ny", "friction")])
+"""A half-plane: point, unit normal towards the free side, friction."""
+
+
 class SceneArrays(NamedTuple):
     """B scenes as padded arrays, the compiled kernels' view.
 
-    vertex_count, wall_count (B,); vertices, outward (unit facet normals) (B, V, 2); length (B, V) of facets [m];
-    reflex (B, V); walls (B, W, 5): point, normal, friction; gravity (B,): along -y in the plane, 0 for transverse;
-    support (B,): Coulomb force per vertex of the support plane [N]; path (B, T, 3): desired poses at the knots.
+    vertex_count, wall_count (B,); facets (B, V) of FACET_ROW; walls (B, W) of WALL_ROW; gravity (B,): along -y in the
+    sagittal plane, 0 in the transverse one; support (B,): Coulomb force per vertex of the support plane [N];
+    path (B, T, 3): desired poses at the knots.
     """
 
     vertex_count: np.ndarray
-    vertices: np.ndarray
-    outward: np.ndarray
-    length: np.ndarray
-    reflex: np.ndarray
+    facets: np.ndarray
     mass: np.ndarray
     inertia: np.ndarray
     friction: np.ndarray
@@ -105,47 +108,48 @@ class SceneBatch:
     def without_friction(self) -> "SceneBatch":
         """The same scenes with frictionless fingers and walls."""
         walls = self.arrays.walls.copy()
-        walls[..., 4] = 0
+        walls["friction"] = 0
         return SceneBatch(self.arrays._replace(friction=np.zeros(len(self)), walls=walls))
 
 
 def _arrays(scenes: list[Scene]) -> SceneArrays:
-    count = np.array([len(s.body.vertices) for s in scenes])
-    walls = np.array([len(s.environment.walls) for s in scenes])
-    frames = [facet_frames(s.body.vertices)[0] for s in scenes]
+    facet_rows = [_facet_rows(s.body.vertices) for s in scenes]
+    wall_rows = [_wall_rows(s.environment.walls) for s in scenes]
     return SceneArrays(
-        vertex_count=count,
-        vertices=_padded([s.body.vertices for s in scenes], count.max()),
-        outward=_padded([-n for n in frames], count.max()),
-        length=_padded([_lengths(s.body.vertices) for s in scenes], count.max()),
-        reflex=_padded([reflex_vertices(s.body.vertices).astype(float) for s in scenes], count.max()) > 0,
+        vertex_count=np.array([len(rows) for rows in facet_rows]),
+        facets=_padded(facet_rows),
         mass=np.array([s.body.mass for s in scenes], dtype=float),
         inertia=np.array([s.body.inertia for s in scenes], dtype=float),
         friction=np.array([s.friction for s in scenes], dtype=float),
         stiffness=np.array([s.stiffness for s in scenes], dtype=float),
         gravity=np.array([s.environment.gravity * (s.environment.plane == "sagittal") for s in scenes]),
         support=np.array([_support_force(s) for s in scenes]),
-        wall_count=walls,
-        walls=_padded([_wall_rows(s.environment.walls) for s in scenes], max(walls.max(), 1)),
+        wall_count=np.array([len(rows) for rows in wall_rows]),
+        walls=_padded(wall_rows),
         path=np.array([s.trajectory.poses for s in scenes], dtype=float),
         dt=np.array([s.trajectory.dt for s in scenes], dtype=float),
     )
 
 
-def _padded(rows: Sequence[Array], size: int) -> Array:
-    out = np.zeros((len(rows), size, *rows[0].shape[1:]))
+def _padded(rows: list[np.ndarray]) -> np.ndarray:
+    out = np.zeros((len(rows), max(1, *(len(r) for r in rows))), dtype=rows[0].dtype)
     for k, row in enumerate(rows):
         out[k, : len(row)] = row
     return out
 
 
-def _lengths(vertices: Array) -> Array:
+def _facet_rows(vertices: Array) -> np.ndarray:
     a, b = facets(vertices)
-    return np.linalg.norm(b - a, axis=1)
+    rows = np.zeros(len(vertices), dtype=FACET_ROW)
+    rows["x"], rows["y"] = a.T
+    rows["ox"], rows["oy"] = -facet_frames(vertices)[0].T
+    rows["length"] = np.linalg.norm(b - a, axis=1)
+    rows["reflex"] = reflex_vertices(vertices)
+    return rows
 
 
-def _wall_rows(walls: tuple[HalfPlane, ...]) -> Array:
-    return np.array([[*w.point, *w.normal, w.friction] for w in walls]).reshape(-1, 5)
+def _wall_rows(walls: tuple[HalfPlane, ...]) -> np.ndarray:
+    return np.array([(*w.point, *w.normal, w.friction) for w in walls], dtype=WALL_ROW)
 
 
 def _support_force(scene: Scene) -> float:

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from dlm.simulator.contact import WALL_POINTS, Contacts, View, activation, collect, contacts_for
-from dlm.simulator.lcp import Complementarity, complementarity_for, solve_contacts
+from dlm.simulator.contact import CONTACT, WALL_POINTS, View, activation, collect
+from dlm.simulator.lcp import ROW, solve_contacts
 from dlm.simulator.settings import Physics
 
 SHALLOW = 1e-5
@@ -26,15 +26,20 @@ SUPPORT_ITERATIONS, SUPPORT_TOLERANCE = 60, 1e-13
 
 
 class Work(NamedTuple):
-    """Scratch memory of one step, and its results: velocity (3,), finger velocities (C, 2), contacts and impulses."""
+    """Scratch memory of one step, and its results.
 
-    contacts: Contacts
-    problem: Complementarity
+    contacts (n,) of CONTACT, rows (2 n,) of ROW, A and B (2 n, 2 n): see `lcp`.  mobility (3, 3): velocity per impulse.
+    Velocities of the object (3,): predicted without any forces but gravity, free of contacts, and at the end of the step;
+    of the fingers (C, 2): free of contacts, and at the end.
+    """
+
+    contacts: np.ndarray
     rows: np.ndarray
-    directions: np.ndarray
+    A: np.ndarray
+    B: np.ndarray
     mobility: np.ndarray
-    free: np.ndarray
     predicted: np.ndarray
+    free: np.ndarray
     velocity: np.ndarray
     finger_free: np.ndarray
     finger_velocity: np.ndarray
@@ -45,10 +50,10 @@ def work_for(fingers: int, walls: int) -> Work:
     """Scratch memory for scenes with at most so many fingers and walls."""
     size = 2 * fingers + WALL_POINTS * walls
     return Work(
-        contacts_for(size),
-        complementarity_for(size),
-        np.zeros((2 * size, 3)),
-        np.zeros((2 * size, 2)),
+        np.zeros(size, CONTACT),
+        np.zeros(2 * size, ROW),
+        np.zeros((2 * size, 2 * size)),
+        np.zeros((2 * size, 2 * size)),
         np.zeros((3, 3)),
         np.zeros(3),
         np.zeros(3),
@@ -74,117 +79,116 @@ def solve_step(
     whether their problem was solved exactly.
     """
     h = scene.dt / physics.substeps
-    work.predicted[:] = v
-    work.predicted[1] -= h * scene.gravity
+    work.predicted[0], work.predicted[1], work.predicted[2] = v[0], v[1] - h * scene.gravity, v[2]
     follow = scene.stiffness / (scene.stiffness * h + physics.damping)
     for c in range(len(p)):
-        for d in range(2):
-            work.finger_free[c, d] = follow * (u[c, d] - p[c, d])
+        work.finger_free[c, 0] = follow * (u[c, 0] - p[c, 0])
+        work.finger_free[c, 1] = follow * (u[c, 1] - p[c, 1])
     n = collect(scene, physics, q, work.predicted, p, work.finger_free, work.contacts)
-    assemble_rows(n, q, work)
-    if scene.support == 0:
-        work.mobility[:] = 0
-        work.mobility[0, 0] = work.mobility[1, 1] = 1 / scene.mass
-        work.mobility[2, 2] = 1 / scene.inertia
-        work.free[:] = work.predicted
-        exact = _velocities(n, scene, physics, work)
-    else:
-        exact = _with_support(n, scene, physics, q, v, work)
-    return n, exact
+    _contact_rows(n, q, work.contacts, work.rows)
+    if scene.support > 0:
+        return n, _with_support(n, scene, physics, q, v, work)
+    for d in range(3):
+        work.mobility[d, :] = 0
+        work.mobility[d, d] = 1 / (scene.inertia if d == 2 else scene.mass)
+        work.free[d] = work.predicted[d]
+    return n, _solve_velocities(n, scene, physics, work)
 
 
 @njit(cache=True)
-def assemble_rows(n: int, q: np.ndarray, work: Work) -> None:
-    """Contact Jacobian (2 n, 3) and directions (2 n, 2)."""
+def _contact_rows(n: int, q: np.ndarray, contacts: np.ndarray, rows: np.ndarray) -> None:
+    """Contact Jacobian: row 2 i is the normal direction of contact i, row 2 i + 1 the normal turned by +90 degrees."""
     for i in range(n):
-        nx, ny = work.contacts.normal[i, 0], work.contacts.normal[i, 1]
-        ax, ay = work.contacts.point[i, 0] - q[0], work.contacts.point[i, 1] - q[1]
-        for r, dx, dy in ((2 * i, nx, ny), (2 * i + 1, -ny, nx)):
-            work.directions[r, 0] = work.rows[r, 0] = dx
-            work.directions[r, 1] = work.rows[r, 1] = dy
-            work.rows[r, 2] = ax * dy - ay * dx
+        nx, ny = contacts[i].nx, contacts[i].ny
+        ax, ay = contacts[i].x - q[0], contacts[i].y - q[1]
+        normal, tangent = rows[2 * i], rows[2 * i + 1]
+        normal.x, normal.y, normal.turn = nx, ny, ax * ny - ay * nx
+        tangent.x, tangent.y, tangent.turn = -ny, nx, ax * nx + ay * ny
 
 
 @njit(cache=True)
-def softness(gap: float, physics: Physics) -> float:
+def softness(gap: float, kappa: float, regularization: float) -> float:
     """Compliance of a contact over its scale: (1 - a) / a for activation a, never below the floor."""
-    if np.isinf(physics.kappa):
-        return physics.regularization
-    a = activation(gap, physics.kappa)
-    return physics.regularization + (1 - a) / a
+    if np.isinf(kappa):
+        return regularization
+    a = activation(gap, kappa)
+    return regularization + (1 - a) / a
 
 
 @njit(cache=True)
-def bias(gap: float, h: float, physics: Physics) -> float:
+def bias(gap: float, h: float, kappa: float) -> float:
     """Velocity that the normal row adds: what closes an open gap, or what removes a share of a penetration."""
     if gap < -SHALLOW:
         return max((CORRECTION * (gap + SHALLOW) - SHALLOW) / h, -FASTEST_CORRECTION)
-    return gap / h if gap < 0 or np.isinf(physics.kappa) else 0.0
+    return gap / h if gap < 0 or np.isinf(kappa) else 0.0
 
 
 @njit(cache=True)
-def finger_mobility(scene: View, physics: Physics) -> float:
+def finger_mobility(stiffness: float, damping: float, h: float) -> float:
     """Velocity of a finger per impulse on it."""
-    h = scene.dt / physics.substeps
-    return 1 / (h * (scene.stiffness * h + physics.damping))
+    return 1 / (h * (stiffness * h + damping))
 
 
 @njit(cache=True)
-def scale(r: int, scene: View, physics: Physics, work: Work) -> float:
-    """What row r of the problem would have on its diagonal for a free object: the unit of the contact's compliance."""
-    value = 1 / scene.mass + work.rows[r, 2] ** 2 / scene.inertia
-    return value + finger_mobility(scene, physics) if work.contacts.finger[r // 2] >= 0 else value
+def contact_scale(mass: float, inertia: float, lever: float, give: float) -> float:
+    """What a row would have on the diagonal of A for a free object: the unit of the contact's compliance."""
+    return 1 / mass + lever * lever / inertia + give
 
 
 @njit(cache=True)
 def assemble_problem(n: int, scene: View, physics: Physics, work: Work) -> None:
     """A = J W J^T + finger mobility + compliance and c = relative velocity without impulses + bias."""
     h = scene.dt / physics.substeps
-    give = finger_mobility(scene, physics)
-    A, c, J, D, W = work.problem.A, work.problem.c, work.rows, work.directions, work.mobility
+    give = finger_mobility(scene.stiffness, physics.damping, h)
+    A, W, rows, contacts = work.A, work.mobility, work.rows, work.contacts
     for r in range(2 * n):
-        i, f = r // 2, work.contacts.finger[r // 2]
-        w0 = J[r, 0] * W[0, 0] + J[r, 1] * W[1, 0] + J[r, 2] * W[2, 0]
-        w1 = J[r, 0] * W[0, 1] + J[r, 1] * W[1, 1] + J[r, 2] * W[2, 1]
-        w2 = J[r, 0] * W[0, 2] + J[r, 1] * W[1, 2] + J[r, 2] * W[2, 2]
+        row, contact = rows[r], contacts[r // 2]
+        f = contact.finger
+        w0 = row.x * W[0, 0] + row.y * W[1, 0] + row.turn * W[2, 0]
+        w1 = row.x * W[0, 1] + row.y * W[1, 1] + row.turn * W[2, 1]
+        w2 = row.x * W[0, 2] + row.y * W[1, 2] + row.turn * W[2, 2]
         for s in range(r + 1):
-            value = w0 * J[s, 0] + w1 * J[s, 1] + w2 * J[s, 2]
-            if f >= 0 and work.contacts.finger[s // 2] == f:
-                value += give * (D[r, 0] * D[s, 0] + D[r, 1] * D[s, 1])
+            other = rows[s]
+            value = w0 * other.x + w1 * other.y + w2 * other.turn
+            if f >= 0 and contacts[s // 2].finger == f:
+                value += give * (row.x * other.x + row.y * other.y)
             A[r, s] = A[s, r] = value
-        A[r, r] += softness(work.contacts.gap[i], physics) * scale(r, scene, physics, work)
-        c[r] = J[r, 0] * work.free[0] + J[r, 1] * work.free[1] + J[r, 2] * work.free[2]
+        scale = contact_scale(scene.mass, scene.inertia, row.turn, give if f >= 0 else 0.0)
+        A[r, r] += scale * softness(contact.gap, physics.kappa, physics.regularization)
+        c = row.x * work.free[0] + row.y * work.free[1] + row.turn * work.free[2]
         if f >= 0:
-            c[r] -= D[r, 0] * work.finger_free[f, 0] + D[r, 1] * work.finger_free[f, 1]
-        if r % 2 == 0:
-            c[r] += bias(work.contacts.gap[i], h, physics)
+            c -= row.x * work.finger_free[f, 0] + row.y * work.finger_free[f, 1]
+        row.c = c if r % 2 == 1 else c + bias(contact.gap, h, physics.kappa)
 
 
 @njit(cache=True)
-def _velocities(n: int, scene: View, physics: Physics, work: Work) -> bool:
+def _solve_velocities(n: int, scene: View, physics: Physics, work: Work) -> bool:
     """Solve the contact problem and apply its impulses."""
     exact = True
     if n > 0:
         assemble_problem(n, scene, physics, work)
-        exact = solve_contacts(n, work.problem, work.contacts.friction)
-    apply_impulses(n, scene, physics, work)
+        exact = solve_contacts(n, work.contacts, work.rows, work.A, work.B)
+    _apply_impulses(n, scene, physics, work)
     return exact
 
 
 @njit(cache=True)
-def apply_impulses(n: int, scene: View, physics: Physics, work: Work) -> None:
-    """Velocities of object and fingers from the impulses in work.problem.P."""
-    give = finger_mobility(scene, physics)
-    work.velocity[:] = work.free
+def _apply_impulses(n: int, scene: View, physics: Physics, work: Work) -> None:
+    """Velocities of object and fingers from the impulses."""
+    give = finger_mobility(scene.stiffness, physics.damping, scene.dt / physics.substeps)
     work.finger_velocity[:] = work.finger_free
+    x, y, turn = 0.0, 0.0, 0.0
     for r in range(2 * n):
-        P, f = work.problem.P[r], work.contacts.finger[r // 2]
-        for k in range(3):
-            for j in range(3):
-                work.velocity[k] += work.mobility[k, j] * work.rows[r, j] * P
+        row, f = work.rows[r], work.contacts[r // 2].finger
+        x += row.x * row.P
+        y += row.y * row.P
+        turn += row.turn * row.P
         if f >= 0:
-            work.finger_velocity[f, 0] -= give * work.directions[r, 0] * P
-            work.finger_velocity[f, 1] -= give * work.directions[r, 1] * P
+            work.finger_velocity[f, 0] -= give * row.x * row.P
+            work.finger_velocity[f, 1] -= give * row.y * row.P
+    W = work.mobility
+    for k in range(3):
+        work.velocity[k] = work.free[k] + W[k, 0] * x + W[k, 1] * y + W[k, 2] * turn
 
 
 @njit(cache=True)
@@ -195,32 +199,31 @@ def _with_support(n: int, scene: View, physics: Physics, q: np.ndarray, v: np.nd
     its own, within the unit disc, lets Newton's method converge from afar.
     """
     guess = work.predicted.copy()
-    friction = support_directions(scene, q, guess)
+    friction = support_directions(scene.facets, q, guess)
     exact = True
     for _ in range(SUPPORT_ITERATIONS):
         support_mobility(scene, physics, q, v, guess, friction, work)
-        exact = _velocities(n, scene, physics, work)
-        change = _update_directions(scene, q, guess, work.velocity, friction)
+        exact = _solve_velocities(n, scene, physics, work)
+        change = _update_directions(scene.facets, q, guess, work.velocity, friction)
         guess[:] = work.velocity
         if change < SUPPORT_TOLERANCE:
             return exact
     return False
 
 
-@njit(cache=True, inline="always")
-def vertex_arm(scene: View, k: int, cs: float, sn: float) -> tuple[float, float]:
-    """Vertex k seen from the centre of mass, world frame, for cosine and sine of the object's angle."""
-    x, y = scene.vertices[k, 0], scene.vertices[k, 1]
+@njit(cache=True)
+def vertex_arm(x: float, y: float, cs: float, sn: float) -> tuple[float, float]:
+    """A vertex seen from the centre of mass, world frame, for cosine and sine of the object's angle."""
     return cs * x - sn * y, sn * x + cs * y
 
 
 @njit(cache=True)
-def support_directions(scene: View, q: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+def support_directions(facets: np.ndarray, q: np.ndarray, velocity: np.ndarray) -> np.ndarray:
     """Directions w (V, 2) that the support friction opposes."""
-    w = np.zeros((len(scene.vertices), 2))
+    w = np.zeros((len(facets), 2))
     cs, sn = np.cos(q[2]), np.sin(q[2])
     for k in range(len(w)):
-        rx, ry = vertex_arm(scene, k, cs, sn)
+        rx, ry = vertex_arm(facets[k].x, facets[k].y, cs, sn)
         sx, sy = velocity[0] - ry * velocity[2], velocity[1] + rx * velocity[2]
         speed = np.sqrt(sx * sx + sy * sy + SUPPORT_CREEP**2)
         w[k, 0], w[k, 1] = sx / speed, sy / speed
@@ -245,8 +248,8 @@ def support_mobility(
     b[0], b[1], b[2] = scene.mass * v[0], scene.mass * v[1], scene.inertia * v[2]
     cs, sn = np.cos(q[2]), np.sin(q[2])
     S[0, 0] = S[1, 1] = 1
-    for k in range(len(scene.vertices)):
-        rx, ry = vertex_arm(scene, k, cs, sn)
+    for k in range(len(scene.facets)):
+        rx, ry = vertex_arm(scene.facets[k].x, scene.facets[k].y, cs, sn)
         S[0, 2], S[1, 2] = -ry, rx
         sx, sy = guess[0] - ry * guess[2], guess[1] + rx * guess[2]
         speed = np.sqrt(sx * sx + sy * sy + SUPPORT_CREEP**2)
@@ -269,13 +272,13 @@ def support_mobility(
 
 @njit(cache=True)
 def _update_directions(
-    scene: View, q: np.ndarray, before: np.ndarray, after: np.ndarray, friction: np.ndarray
+    facets: np.ndarray, q: np.ndarray, before: np.ndarray, after: np.ndarray, friction: np.ndarray
 ) -> float:
     """Newton step of the directions w, drawn back into the unit disc; returns the largest change of a vertex velocity."""
     cs, sn = np.cos(q[2]), np.sin(q[2])
     largest = 0.0
     for k in range(len(friction)):
-        rx, ry = vertex_arm(scene, k, cs, sn)
+        rx, ry = vertex_arm(facets[k].x, facets[k].y, cs, sn)
         sx, sy = before[0] - ry * before[2], before[1] + rx * before[2]
         dx = after[0] - ry * after[2] - sx
         dy = after[1] + rx * after[2] - sy
