@@ -70,7 +70,7 @@ def balanced(s: ScaledTask, found: Found, margin: float) -> Found:
             [np.where(pushing(found.modes)[..., None], found.alpha, 0).ravel(), found.reactions]
         )
         inside = np.minimum(found.rho - margin, 1 - margin - found.rho) > LOOSE
-        slopes = _torque_slopes(s, found, np.where(inside, interval, FREE))
+        slopes = _torque_slopes(s, found, np.where(inside, interval, FREE), interval.max() + 1)
         jacobian = np.concatenate([columns * (weights > LOOSE), slopes], axis=1)
         change = np.linalg.lstsq(jacobian, s.required.ravel() - columns @ weights, rcond=None)[0]
         weights, rho_change = weights + change[: len(weights)], np.append(change[len(weights) :], 0.0)
@@ -91,12 +91,12 @@ def _wrench_columns(s: ScaledTask, found: Found) -> Array:
     return np.concatenate([own.reshape(3 * T, -1), s.reactions.reshape(3 * T, -1)], axis=1)
 
 
-def _torque_slopes(s: ScaledTask, found: Found, interval: IntArray) -> Array:
-    """d torque / d rho (3 t, intervals): (b - a) x lambda at each step of an interval."""
+def _torque_slopes(s: ScaledTask, found: Found, interval: IntArray, count: int) -> Array:
+    """d torque / d rho (3 t, count): (b - a) x lambda at each step of an interval."""
     T, C = found.modes.shape
     _, forces = _fingers(s, found)
     a, b = np.moveaxis(s.levers[np.arange(T)[:, None], np.maximum(found.modes, 0)], 2, 0)
-    slopes = np.zeros((T, 3, interval.max() + 2))  # the last column collects what is free
+    slopes = np.zeros((T, 3, count + 1))  # the last column collects what is free
     for c in range(C):
         slopes[np.arange(T), 2, interval[:, c]] += cross(b - a, forces)[:, c]
     return slopes[..., :-1].reshape(3 * T, -1)
