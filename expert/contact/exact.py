@@ -13,7 +13,7 @@ from expert.contact.plan_at import all_forces, positions_at
 from expert.contact.polish import polish as polished
 from expert.contact.reasons import why_infeasible
 from expert.contact.recovery import plan_cost, wrench_residual
-from expert.contact.search import Outcome, Search
+from expert.contact.search import NEGLIGIBLE, Outcome, Search
 from expert.errors import SolverFailed
 from expert.geometry.pose import Array
 from expert.types import ContactTask, Plan, Status
@@ -74,8 +74,8 @@ def _plan(task: ContactTask, model: Model, outcome: Outcome, z: Array, gap: floa
     if not residual <= RESIDUAL:
         raise SolverFailed(f"the best plan misses Newton-Euler by {residual:.2g} of the object's weight")
     objective = plan_cost(task, sequence.modes, positions, forces)
-    bound = min(outcome.bound * task.weight**2, objective)
-    closed = objective - bound <= gap * abs(objective) * (1 + 1e-9)
+    bound = min(float(outcome.bound) * task.weight**2, objective)
+    closed = objective - bound <= max(gap * abs(objective), NEGLIGIBLE * task.weight**2) * (1 + 1e-9)
     return Plan(
         status="optimal" if closed else "feasible",
         objective=objective,

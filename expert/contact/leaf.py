@@ -30,6 +30,8 @@ THETA_RIDGE = 1e-8
 """Curvature of the variables that stand for the steps' costs; the bound is recomputed without it."""
 WORTH = 0.3
 """Share of the gap that a new cut must promise to close; below, the chords are too coarse and the box is split."""
+ROUNDING = 1e-12
+"""Relative size of the terms of a proof that rounding may have made up."""
 NEARBY = 1e-5
 """Where a step has no balance, the cost within this distance of rho gives a second cut: forces grow huge before they fail."""
 
@@ -200,8 +202,10 @@ def relax(
         cost, missing = evaluate(model, sequence, master, last, lo, hi, error)
         if cost < best and intrusion[2] == 0.0:
             best, z = cost, last
-        open_gap = missing if missing > 0 else cost - bound
-        if open_gap <= gap * abs(cost) or open_gap - error.sum() <= WORTH * open_gap:
+        if missing == 0.0 and cost - bound <= gap * abs(cost):
+            break
+        distance = missing if missing > 0.0 else cost - bound
+        if distance - error.sum() <= WORTH * distance:
             break
     return Relaxed(bound, forces, best, z, last, intrusion, error)
 
@@ -262,10 +266,11 @@ def safe_bound(
 
 @njit(cache=True)
 def empty(model: Model, master: Master, u: Array, lo: Array, hi: Array, n: int) -> bool:
-    """Whether multipliers prove that no z in the box satisfies the rows that bound no theta."""
-    row, side = np.zeros(n), 0.0
+    """Whether multipliers prove, rounding aside, that no z in the box satisfies the rows that bound no theta."""
+    row, side, size = np.zeros(n), 0.0, 0.0
     for i in range(u.size):
         if master.step[i] < 0 and u[i] > 0:
             row -= u[i] * master.A[i, :n]
             side += u[i] * master.b[i]
-    return side + least_over_box(model, np.zeros(n), row, lo, hi) > 1e-9 * (1 + u.max())
+            size += u[i] * (abs(master.b[i]) + np.abs(master.A[i, :n]).sum())
+    return side + least_over_box(model, np.zeros(n), row, lo, hi) > ROUNDING * size

@@ -15,8 +15,13 @@ from numba import njit
 from expert.contact.model import Model
 from expert.contact.qp import INFEASIBLE
 from expert.contact.steps import solve_step
+from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
 from expert.types import IntArray
+
+
+MOST_STATES = 60_000
+"""Joint states of all fingers that the automaton may have."""
 
 
 class Moves(NamedTuple):
@@ -37,6 +42,13 @@ def moves_of(facets: int, fingers: int, min_interval: int) -> Moves:
     """All moves of the automaton; they depend on no geometry."""
     single = _successors(facets, min_interval)
     base = 1 + 3 * facets
+    if base**fingers > MOST_STATES:
+        raise InvalidProblem(
+            "fingers.count",
+            expected=f"at most {int(np.log(MOST_STATES) / np.log(base))} for {facets} facets",
+            got=str(fingers),
+            remedy="use fewer fingers or a simpler outline",
+        )
     states = np.array(list(itertools.product(range(base), repeat=fingers)))
     place, digit = base ** np.arange(fingers)[::-1], (facets + 1) ** np.arange(fingers)[::-1]
     follow, active = [], []

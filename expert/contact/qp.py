@@ -12,8 +12,11 @@ import scipy.sparse
 from numba import njit, objmode
 
 from expert.geometry.pose import Array
+from expert.types import IntArray
 
 SOLVED, INFEASIBLE, FAILED = 0, 1, 2
+BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+
 FEASIBILITY = 1e-10
 """Largest violation of a constraint, in the program's own (non-dimensional) units."""
 
@@ -62,6 +65,7 @@ def goldfarb_idnani(
         else:
             p, s = _most_violated(A, b, x, in_use, equalities)
             if p < 0:
+                _refine(J, R, A, b, active, flipped, x, q)
                 for k in range(q):
                     u[active[k]] = dual[k] * flipped[active[k]]
                 return SOLVED, x, u
@@ -142,7 +146,7 @@ def _steepest_start(J: Array, g: Array, x: Array) -> None:
 
 
 @njit(cache=True)
-def _most_violated(A: Array, b: Array, x: Array, in_use: Array, equalities: int) -> tuple[int, float]:
+def _most_violated(A: Array, b: Array, x: Array, in_use: BoolArray, equalities: int) -> tuple[int, float]:
     worst, least = -1, -FEASIBILITY
     for i in range(equalities, b.size):
         if not in_use[i]:
@@ -190,6 +194,25 @@ def _first_blocking(dual: Array, r: Array, fixed: int, q: int) -> tuple[int, flo
 
 
 @njit(cache=True)
+def _refine(
+    J: Array, R: Array, A: Array, b: Array, active: IntArray, flipped: Array, x: Array, q: int
+) -> None:
+    """One step of iterative refinement: the active constraints hold to rounding, not to the method's drift."""
+    w = np.empty(q)
+    for k in range(q):
+        i = active[k]
+        w[k] = flipped[i] * b[i]
+        for j in range(x.size):
+            w[k] -= flipped[i] * A[i, j] * x[j]
+        for j in range(k):
+            w[k] -= R[j, k] * w[j]
+        w[k] /= R[k, k]
+    for k in range(q):
+        for j in range(x.size):
+            x[j] += w[k] * J[k, j]
+
+
+@njit(cache=True)
 def _append(J: Array, R: Array, d: Array, q: int, n: int) -> None:
     """Rotate d into its first q + 1 entries and make them column q of R."""
     for j in range(n - 1, q, -1):
@@ -206,7 +229,7 @@ def _append(J: Array, R: Array, d: Array, q: int, n: int) -> None:
 
 
 @njit(cache=True)
-def _remove(J: Array, R: Array, active: Array, dual: Array, drop: int, q: int, n: int) -> None:
+def _remove(J: Array, R: Array, active: IntArray, dual: Array, drop: int, q: int, n: int) -> None:
     for j in range(drop + 1, q):
         active[j - 1], dual[j - 1] = active[j], dual[j]
         for i in range(j + 1):

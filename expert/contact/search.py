@@ -21,6 +21,10 @@ from expert.types import FREE, IntArray
 
 ROUNDS = 25
 """Master programs per visit of a complete sequence."""
+NEGLIGIBLE = 1e-9
+"""Costs are not told apart below this [(m g)^2]: what costs nothing has no relative gap."""
+MIDDLE = 0.35
+"""A box is split where the relaxation's solution lies, but no nearer to an end than this share of its width."""
 NARROWEST = 1e-9
 """Boxes are not split below this width of rho."""
 
@@ -43,7 +47,6 @@ class Leaf:
     lo: Array
     hi: Array
     assigned: IntArray
-    narrowed: bool = False
 
 
 @dataclass
@@ -83,12 +86,14 @@ class Search:
     @property
     def cutoff(self) -> float:
         """Bounds at or above this cannot improve the best plan by more than the gap."""
-        return self.best.cost - self.gap * abs(self.best.cost) if np.isfinite(self.best.cost) else np.inf
+        best = self.best.cost
+        return best - max(self.gap * abs(best), NEGLIGIBLE) if np.isfinite(best) else np.inf
 
     def run(self, *, node_limit: int | None, deadline: float) -> Outcome:
         """Search until the gap closes, the tree is empty or a budget is spent."""
         states = self.moves.states
-        for s in np.flatnonzero(((states == 0) | (states % 3 == 1)).all(axis=1)):  # free, or just arrived
+        starts = np.flatnonzero(((states == 0) | (states % 3 == 1)).all(axis=1))  # free, or just arrived
+        for s in reversed(starts):  # of equals the last is expanded first: fingers without use stay free
             self._push_prefix((), int(s), 0.0, 0.0)
         while self.heap and self.heap[0][0] < self.cutoff:
             if time.perf_counter() > deadline or (node_limit is not None and self.nodes >= node_limit):
@@ -137,9 +142,9 @@ class Search:
         self.nodes += 1
         if t == self.model.steps - 1:
             return self._plant(settled, node)
-        span = slice(self.moves.start[node.state], self.moves.start[node.state + 1])
-        for state, active in zip(self.moves.follow[span], self.moves.active[span], strict=True):
-            self._push_prefix(node.modes, int(state), node.forces + float(self.phi[t, active]), smooth)
+        for k in reversed(range(self.moves.start[node.state], self.moves.start[node.state + 1])):
+            forces = node.forces + float(self.phi[t, self.moves.active[k]])
+            self._push_prefix(node.modes, int(self.moves.follow[k]), forces, smooth)
         return None
 
     def _least_smoothing(self, modes: tuple[int, ...]) -> float:
@@ -163,17 +168,15 @@ class Search:
     # complete sequences
 
     def _plant(self, bound: float, node: Prefix) -> None:
+        """Visit a complete sequence with its box narrowed to where every step can be balanced, if there is such a box."""
         sequence = sequence_of(self.model, np.array(node.modes).T.copy())
-        unassigned = np.full_like(sequence.modes, -1)
-        self._visit(bound, Leaf(sequence, sequence.lo, sequence.hi, unassigned))
+        lo, hi = sequence.lo.copy(), sequence.hi.copy()
+        if narrow(self.model, sequence, lo, hi):
+            self._visit(bound, Leaf(sequence, lo, hi, np.full_like(sequence.modes, -1)))
 
     def _visit(self, bound: float, leaf: Leaf) -> None:
         """Bound the box; keep the best plan; split where the relaxation is loosest."""
         self.nodes += 1
-        lo, hi = leaf.lo.copy(), leaf.hi.copy()
-        if not leaf.narrowed and not narrow(self.model, leaf.sequence, lo, hi):
-            return
-        leaf = Leaf(leaf.sequence, lo, hi, leaf.assigned, narrowed=True)
         found = self._relax(leaf)
         bound = max(bound, found.bound)
         if bound >= self.cutoff:
@@ -204,7 +207,7 @@ class Search:
                     assigned[t, c] = region
             if (assigned == before).all():
                 return
-            found = self._relax(Leaf(leaf.sequence, leaf.lo, leaf.hi, assigned, narrowed=True))
+            found = self._relax(Leaf(leaf.sequence, leaf.lo, leaf.hi, assigned))
             if found.intrusion[2] == 0:
                 return
             z = found.last
@@ -216,7 +219,7 @@ class Search:
                 assigned = leaf.assigned.copy()
                 assigned[t, c] = region
                 apart = found.forces + self._assigned_smoothing(leaf.sequence.modes, assigned)
-                yield max(bound, apart), Leaf(leaf.sequence, leaf.lo, leaf.hi, assigned, narrowed=True)
+                yield max(bound, apart), Leaf(leaf.sequence, leaf.lo, leaf.hi, assigned)
             return
         width = leaf.hi - leaf.lo
         exact = found.chord_error.max(initial=0.0) <= 1e-6 * abs(found.bound)  # then the widest is split
@@ -225,7 +228,8 @@ class Search:
             self.pruned = min(self.pruned, bound)  # too narrow to split: it stays open
             return
         k = int(error.argmax())
-        at = float(np.clip(found.last[k], leaf.lo[k] + 0.2 * width[k], leaf.hi[k] - 0.2 * width[k]))
+        room = MIDDLE * width[k]
+        at = float(np.clip(found.last[k], leaf.lo[k] + room, leaf.hi[k] - room))
         for lo, hi in ((leaf.lo[k], at), (at, leaf.hi[k])):
             low, high = leaf.lo.copy(), leaf.hi.copy()
             low[k], high[k] = lo, hi

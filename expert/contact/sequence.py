@@ -192,7 +192,7 @@ def least_smoothing(model: Model, modes: IntArray, assigned: IntArray) -> tuple[
     if status == INFEASIBLE:
         z[:] = 0.0
     bound += least_over_box(model, z, slope, s.lo, s.hi)
-    if status == INFEASIBLE and bound > 1e-9 * (1 + u.max()):
+    if status == INFEASIBLE and bound > 1e-12 * np.abs(u).max() * (1 + np.abs(b).max()) * b.size:
         return np.inf, -1
     if status != SOLVED:
         return 0.0, -1
