@@ -11,6 +11,7 @@ winds once around the start, and at L and U it can be contracted inside the obst
 cannot reach either end, nor cross the loop in between (docs/caging.md).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ import numpy as np
 from expert.caging.swept import REACH, SweptGeometry
 from expert.geometry.pose import Array, rotation
 from expert.mip.backends import Answer, Solver
-from expert.mip.linear import LinearModel
+from expert.mip.linear import LinearModel, Term
 from expert.types import IntArray
 
 MOST_TURNS = 2
@@ -27,49 +28,62 @@ ANGLE_MARGIN = 1e-3
 
 
 @dataclass(frozen=True)
-class Ring:
-    """Fingers in the order of the loop: `free` of them searched, the others at given relative positions (m, 2)."""
+class Element:
+    """One point obstacle of the loop, relative: a searched finger (its index) or a point between `ends` (2, 2).
 
-    free: int
-    fixed: Array
+    A wall is two such points in a row, where the loop enters and where it leaves; `joined` marks the first of them.
+    """
 
-    @property
-    def count(self) -> int:
-        """All of them."""
-        return self.free + len(self.fixed)
+    finger: int | None = None
+    ends: Array | None = None
+    joined: bool = False
 
 
 class SweptModel:
-    """Variables and constraints for one range of orientations; `hub` is the fan's apex at the lower limit."""
+    """Variables and constraints for one range of orientations; `hub` is the fan's apex at the lower limit.
+
+    one_piece: the loop enters and leaves each finger by the same piece: a smaller model with fewer solutions.
+    """
 
     def __init__(
-        self, geometry: SweptGeometry, ring: Ring, low: float, high: float, *, hub: int = 0
+        self,
+        geometry: SweptGeometry,
+        ring: Sequence[Element],
+        limits: tuple[float, float],
+        *,
+        hub: int = 0,
+        one_piece: bool = False,
     ) -> None:
-        self.geometry, self.ring, self.limits = geometry, ring, (low, high)
+        self.geometry, self.ring, self.limits = geometry, tuple(ring), limits
+        self.count = len(ring)
         self.milp = LinearModel()
-        self.p = self.milp.add((ring.count, 2), -REACH, REACH)
-        self.overlaps = geometry.overlaps(low, high)
-        self.pairs = [
-            (int(i), int(j)) for i, j in zip(*np.nonzero(geometry.meeting), strict=True)
-        ]
+        self.p = self.milp.add((self.count, 2), -REACH, REACH)
+        self.overlaps = geometry.overlaps(*limits)
+        only = np.eye(len(geometry.pieces), dtype=bool) if one_piece else True
+        self.pairs = [(int(i), int(j)) for i, j in zip(*np.nonzero(geometry.meeting & only), strict=True)]
         self.feasible = bool(self.overlaps) and bool(self.pairs)
-        if not self.feasible:
-            return
-        self._keep_fixed()
-        self._choose_regions_and_pieces()
-        self._loop()
-        self._winding()
-        self._fill(0, hub)
-        self._fill(1, 0)
+        if self.feasible:
+            self._keep_on_ends()
+            self._choose_regions_and_pieces()
+            self._loop()
+            self._winding()
+            self._fill(0, hub)
+            self._fill(1, 0)
 
-    def _keep_fixed(self) -> None:
-        fixed = self.p[self.ring.free :]
-        if len(fixed):
-            self.milp.equal([(1.0, fixed)], self.ring.fixed)
+    def finger(self, index: int) -> IntArray:
+        """Variables (2,) of a searched finger."""
+        return self.p[[e.finger for e in self.ring].index(index)]
+
+    def _keep_on_ends(self) -> None:
+        for n, element in enumerate(self.ring):
+            if element.ends is not None:
+                a, b = element.ends
+                along = self.milp.add((1,), 0.0, 1.0)
+                self.milp.equal([(1.0, self.p[n]), (a - b, np.repeat(along, 2))], a)
 
     def _choose_regions_and_pieces(self) -> None:
         """Non-penetration at the start: W = 1 => p in its region; entry and exit pieces meet."""
-        m, n = self.milp, self.ring.count
+        m, n = self.milp, self.count
         regions = self.geometry.regions
         self.R = m.binaries(n, len(regions))
         self.W = m.add((n, len(regions), len(self.pairs)), 0.0, 1.0)
@@ -86,16 +100,19 @@ class SweptModel:
 
     def _loop(self) -> None:
         """Exactly one pair of pieces joins neighbours, for all orientations: H = 1 => p[n] - p[n+1] in K_ij."""
-        m, n = self.milp, self.ring.count
+        m, n = self.milp, self.count
         keys = list(self.overlaps)
         self.H = m.binaries(n, len(keys))
         m.equal([(1.0, self.H)], np.ones(n))
         d = m.add((n, len(keys), 2), -2 * REACH, 2 * REACH)
         following = np.roll(self.p, -1, axis=0)
         m.equal([(1.0, self.p), (-1.0, following), (-1.0, np.swapaxes(d, 1, 2))], np.zeros((n, 2)))
+        apart = np.array([not element.joined for element in self.ring])
         for k, key in enumerate(keys):
             for a, b in zip(*self.overlaps[key], strict=True):
-                m.at_most([(a, d[:, k]), (-b, self.H[:, k, None])], np.zeros(n))
+                m.at_most([(a, d[apart, k]), (-b, self.H[apart, k, None])], np.zeros(apart.sum()))
+        for joined in np.flatnonzero(~apart):
+            self._stay_on_wall(int(joined), keys)
         exit_of, entry_of = (np.array([key[e] for key in keys]) for e in (0, 1))
         entry, exit_ = (np.array([pair[e] for pair in self.pairs]) for e in (0, 1))
         for c in range(len(self.geometry.pieces)):
@@ -104,9 +121,17 @@ class SweptModel:
                 chosen = self.W[:, :, ends].reshape(n, -1)
                 m.equal([(1.0, joins), (-1.0, chosen)], np.zeros(n))
 
+    def _stay_on_wall(self, c: int, keys: list[tuple[int, int]]) -> None:
+        """Between its two points a wall's obstacle (segment - piece) is convex: same piece, same region."""
+        other = [k for k, (i, j) in enumerate(keys) if i != j]
+        if other:
+            self.milp.equal([(1.0, self.H[c, other])], np.zeros(len(other)))
+        following = (c + 1) % self.count
+        self.milp.equal([(1.0, self.R[c]), (-1.0, self.R[following])], np.zeros(self.R.shape[1]))
+
     def _winding(self) -> None:
         """Winding number one about the start, from directions that are linear in W."""
-        m, n = self.milp, self.ring.count
+        m, n = self.milp, self.count
         alpha = self.geometry.directions
         entry, exit_ = (np.array([pair[e] for pair in self.pairs]) for e in (0, 1))
         k = m.add((n,), -MOST_TURNS, MOST_TURNS, integral=True)
@@ -114,7 +139,7 @@ class SweptModel:
         into = np.broadcast_to(alpha[:, entry].reshape(1, -1), flat.shape)
         out = np.broadcast_to(alpha[:, exit_].reshape(1, -1), flat.shape)
         for sign in (1.0, -1.0):
-            gap = [
+            gap: list[Term] = [
                 (sign * into, np.roll(flat, -1, axis=0)),
                 (-sign * out, flat),
                 (sign * 2 * np.pi, k[:, None]),
@@ -124,7 +149,7 @@ class SweptModel:
 
     def _fill(self, end: int, hub: int) -> None:
         """At a limit, triangle t of the fan (hub, hub+t+1, hub+t+2) has a point common to the pieces of its fingers."""
-        m, n = self.milp, self.ring.count
+        m, n = self.milp, self.count
         turn = rotation(self.limits[end])
         triangles = max(1, n - 2)
         y = m.add((triangles, 2), -2 * REACH, 2 * REACH)
@@ -134,20 +159,17 @@ class SweptModel:
                 f = m.add((len(self.pairs), 2), -2 * REACH, 2 * REACH)
                 # R^T (p - y) = sum f, row by row of R^T
                 for d in range(2):
-                    m.equal(
-                        [(turn[:, d], self.p[c]), (-turn[:, d], y[t]), (-1.0, f[:, d])], 0.0
-                    )
+                    m.equal([(turn[:, d], self.p[c]), (-turn[:, d], y[t]), (-1.0, f[:, d])], 0.0)
                 for q, (i, j) in enumerate(self.pairs):
                     A, b = self.geometry.common(i, j)
                     rows = len(b)
                     chosen = np.broadcast_to(self.W[c, :, q], (rows, self.W.shape[1]))
-                    m.at_most(
-                        [(A, np.broadcast_to(f[q], (rows, 2))), (-b[:, None], chosen)], np.zeros(rows)
-                    )
+                    m.at_most([(A, np.broadcast_to(f[q], (rows, 2))), (-b[:, None], chosen)], np.zeros(rows))
 
-    def order_first(self, others: IntArray) -> None:
-        """Break the symmetry of renaming: finger 0 is leftmost among `others`."""
-        self.milp.at_most([(1.0, np.broadcast_to(self.p[0, 0], others.shape)), (-1.0, self.p[others, 0])], np.zeros(len(others)))
+    def leftmost_first(self, others: Sequence[int]) -> None:
+        """Break the symmetry of renaming: element 0 is left of the others."""
+        first = np.broadcast_to(self.p[0, 0], (len(others),))
+        self.milp.at_most([(1.0, first), (-1.0, self.p[list(others), 0])], np.zeros(len(others)))
 
     def solve(self, solver: Solver, time_limit: float) -> Answer:
         """An answer's x holds the positions at `p` and the binaries at `R` and `H`."""

@@ -31,11 +31,20 @@ class SweptGeometry:
 
     vertices: Array
     clearance: float
+    most_pieces: int = 99
 
     @cached_property
     def pieces(self) -> list[Array]:
-        """C_i, overlapping."""
-        return overlapping_cover(self.vertices)
+        """C_i, overlapping; where there are more than most_pieces, those that together cover most."""
+        cover = [shapely.Polygon(p) for p in overlapping_cover(self.vertices)]
+        chosen: list[shapely.Polygon] = []
+        covered = shapely.Polygon()
+        while cover and len(chosen) < self.most_pieces:
+            best = max(cover, key=lambda p: p.difference(covered).area)
+            chosen.append(best)
+            cover.remove(best)
+            covered = covered.union(best)
+        return [np.array(p.exterior.coords)[:-1] for p in chosen]
 
     @cached_property
     def meeting(self) -> BoolMatrix:
@@ -136,9 +145,7 @@ def _swept_inside(polygon: Array, low: float, high: float, clearance: float) -> 
     for middle, half in swept_steps(low, high):
         for angle in (middle - half, middle + half):
             result = clip(result, normals @ rotation(angle).T, offsets)
-        result = clip(
-            result, normals[bulging] @ rotation(middle).T, offsets[bulging] * np.cos(half)
-        )
+        result = clip(result, normals[bulging] @ rotation(middle).T, offsets[bulging] * np.cos(half))
         if len(result) < 3:
             break
     return result
@@ -164,8 +171,7 @@ def _has_area(polygon: Array) -> bool:
 def _cleaned(polygon: Array) -> Array:
     """Without corners closer than 1e-7 to the next and without straight ones."""
     ahead = np.roll(polygon, -1, axis=0) - polygon
-    kept = polygon[np.linalg.norm(ahead, axis=1) > 1e-7]
-    return kept
+    return polygon[np.linalg.norm(ahead, axis=1) > 1e-7]
 
 
 def _simplified(polygon: Array, share: float = 0.01) -> Array:
@@ -179,10 +185,3 @@ def _simplified(polygon: Array, share: float = 0.01) -> Array:
             break
         polygon = np.delete(polygon, k, axis=0)
     return polygon
-
-
-def regions_are_disjoint_from(pieces: list[Array], regions: list[Region]) -> bool:
-    """Whether no region enters a piece (for tests)."""
-    return all(not _has_area(clip(p, r.A, r.b)) for p in pieces for r in regions)
-
-

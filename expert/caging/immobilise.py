@@ -1,0 +1,124 @@
+"""Cages around immobilising grasps: fingers at contacts that hold the object still, moved off it by a clearance.
+
+Three fingers  the contacts of a disc that is largest in its neighbourhood (Czyzowicz, Stojmenovic, Urrutia 1999: they
+               immobilise).
+Two fingers    a reflex corner and the nearest point of an edge, or two reflex corners, across the object (squeezing) or
+               across free space (stretching), where the distance is locally least or greatest.
+
+These are candidates only: every one must be verified.
+"""
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+
+from expert.geometry.polygon import contains, facet_frames, facets, reflex_vertices, signed_distance
+from expert.geometry.pose import Array
+
+CLEARANCES = (0.04, 0.02, 0.01, 0.005)
+"""Tried in this order, relative to the object's size."""
+STARTS = 8
+"""Newton's method starts so often for each triple of features."""
+
+
+def candidates(vertices: Array, count: int, size: float, rng: np.random.Generator) -> Iterator[Array]:
+    """Fingers (count, 2) in the body frame, the loosest first; for count > 3 the further ones touch other facets."""
+    grasps = list(_pairs(vertices) if count == 2 else _discs(vertices, rng))
+    for clearance in CLEARANCES:
+        for contacts, outward in grasps:
+            fingers = contacts + clearance * size * outward
+            spare = _spare(vertices, fingers, count - len(fingers), clearance * size)
+            placed = np.concatenate([fingers, spare])
+            if len(placed) == count and (signed_distance(vertices, placed) > 0).all():
+                yield placed
+
+
+def _spare(vertices: Array, fingers: Array, count: int, clearance: float) -> Array:
+    """Points off the middles of the facets that are farthest from the fingers so far."""
+    a, b = facets(vertices)
+    edge = (b - a) / np.linalg.norm(b - a, axis=1, keepdims=True)
+    middles = (a + b) / 2 + clearance * np.column_stack([edge[:, 1], -edge[:, 0]])
+    chosen = np.empty((0, 2))
+    for _ in range(count):
+        taken = np.concatenate([fingers, chosen])
+        gaps = np.linalg.norm(middles[:, None] - taken[None], axis=2).min(axis=1)
+        chosen = np.concatenate([chosen, middles[[int(gaps.argmax())]]])
+    return chosen
+
+
+def _discs(vertices: Array, rng: np.random.Generator) -> list[tuple[Array, Array]]:
+    """Contacts (3, 2) and outward directions of discs in the object that three features hold, the largest first."""
+    discs = _tangent_discs(vertices, rng)
+    size = float(np.ptp(vertices, axis=0).max())
+    exact = np.abs(-signed_distance(vertices, discs[:, :2]) - discs[:, 2]) < 1e-7 * size
+    kept: list[Array] = []
+    grasps = []
+    for disc in sorted(discs[exact], key=lambda d: -d[2]):
+        if all(np.linalg.norm(disc - other) > 1e-3 * size for other in kept):
+            kept.append(disc)
+            grasps += list(_held(vertices, disc[:2], disc[2]))
+    return grasps
+
+
+def _tangent_discs(vertices: Array, rng: np.random.Generator) -> Array:
+    """Centres and radii (k, 3) of discs that touch three features each: facet lines or reflex corners; by Newton's method."""
+    inward, _ = facet_frames(vertices)
+    corners = vertices[reflex_vertices(vertices)]
+    triples = np.array(list(itertools.combinations(range(len(vertices) + len(corners)), 3)))
+    triples = np.concatenate([triples] * STARTS)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    x = np.column_stack([rng.uniform(low, high, (len(triples), 2)), np.zeros(len(triples))])
+    for _ in range(12):
+        gap = x[:, None, :2] - corners[None]
+        length = np.maximum(np.linalg.norm(gap, axis=2, keepdims=True), 1e-12)
+        normals = np.concatenate([np.broadcast_to(inward, (len(x), *inward.shape)), gap / length], axis=1)
+        to_facets = ((x[:, None, :2] - vertices[None]) * inward).sum(axis=2)
+        distances = np.concatenate([to_facets, length[..., 0]], axis=1)
+        jacobian = np.take_along_axis(normals, triples[..., None], axis=1)
+        jacobian = np.concatenate([jacobian, -np.ones((*triples.shape, 1))], axis=2)
+        residual = np.take_along_axis(distances, triples, axis=1) - x[:, 2:]
+        regular = np.abs(np.linalg.det(jacobian)) > 1e-9
+        x, triples = x[regular], triples[regular]
+        x = x - np.linalg.solve(jacobian[regular], residual[regular][..., None])[..., 0]
+    return x
+
+
+def _held(vertices: Array, centre: Array, radius: float) -> Iterator[tuple[Array, Array]]:
+    """Triples of contacts of the disc whose directions positively span the plane."""
+    nearest = _nearest_on_facets(vertices, centre)
+    touching = nearest[np.linalg.norm(nearest - centre, axis=1) <= radius * (1 + 1e-6)]
+    points: list[Array] = []
+    for p in touching:
+        if all(np.linalg.norm(p - q) > 1e-3 * radius for q in points):
+            points.append(p)
+    for triple in itertools.combinations(points, 3):
+        contacts = np.array(triple)
+        outward = (contacts - centre) / np.linalg.norm(contacts - centre, axis=1, keepdims=True)
+        angles = np.sort(np.arctan2(outward[:, 1], outward[:, 0]))
+        gaps = np.diff(np.append(angles, angles[0] + 2 * np.pi))
+        if gaps.max() < np.pi - 0.02:
+            yield contacts, outward
+
+
+def _nearest_on_facets(vertices: Array, x: Array) -> Array:
+    a, b = facets(vertices)
+    along = np.clip(((x - a) * (b - a)).sum(axis=1) / ((b - a) ** 2).sum(axis=1), 0, 1)
+    return a + along[:, None] * (b - a)
+
+
+def _pairs(vertices: Array) -> Iterator[tuple[Array, Array]]:
+    """Contacts (2, 2) and directions in which to move off: reflex corners with corners or edges that face them."""
+    reflex = np.flatnonzero(reflex_vertices(vertices))
+    for k in reflex:
+        nearest = _nearest_on_facets(vertices, vertices[k])
+        others = [*vertices[reflex[reflex > k]], *nearest]
+        for other in others:
+            gap = vertices[k] - other
+            length = float(np.linalg.norm(gap))
+            if length < 1e-9:
+                continue
+            along = gap / length
+            across = bool(contains(vertices, (vertices[k] + other) / 2))
+            away = along if across else -along
+            yield np.array([vertices[k], other]), np.array([away, -away])

@@ -1,0 +1,245 @@
+"""Find fingers that cage an object: solve the model over a ladder of rotation ranges, verify, cut off what is refuted.
+
+No answer leaves unverified.  Where no cost or gripper restricts the fingers, cages around immobilising grasps are tried
+between the quick and the thorough part of the ladder.
+"""
+
+import itertools
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from expert.caging.frame import Frame
+from expert.caging.immobilise import candidates
+from expert.caging.model import Element, SweptModel
+from expert.caging.problem import Arrangement, CageProblem
+from expert.caging.requirements import objective, require
+from expert.caging.solution import CageSolution, Meeting
+from expert.caging.swept import SweptGeometry
+from expert.errors import InvalidProblem
+from expert.geometry.pose import Array, to_world
+from expert.mip.backends import Answer, Solver
+from expert.verify.cage import CageReport, verify_cage
+
+Method = Literal["swept", "model"]
+"""swept: the model, and immobilising grasps where it is slow; model: the model alone."""
+LADDER = tuple((np.radians(a), np.radians(b)) for a, b in (
+    (15, 15), (20, 20), (30, 30), (45, 45), (10, 10), (7, 7), (5, 5),
+    (5, 25), (25, 5), (10, 40), (40, 10), (3, 3), (60, 60),
+))  # fmt: skip
+QUICK = 3
+"""Ranges of the ladder that the quick part tries."""
+MOST_CUTS = 5
+"""Refuted answers per model after which the next one is tried."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One model to solve: half-ranges [rad], size of the cover, entry and exit piece alike, time [s]."""
+
+    below: float
+    above: float
+    most_pieces: int
+    one_piece: bool
+    seconds: float
+
+
+@dataclass
+class Tally:
+    """What happened so far, and the best verified answer."""
+
+    problem: CageProblem
+    deadline: float
+    attempts: int = 0
+    refuted: int = 0
+    unconfirmed: int = 0
+    undecided: bool = False
+    best: CageSolution = field(default_factory=lambda: CageSolution(status="none_found"))
+
+    @property
+    def left(self) -> float:
+        """Time that is left [s]."""
+        return self.deadline - time.perf_counter()
+
+    def judge(self, fingers: Array) -> CageReport | None:
+        """Verify a model's fingers (count, 2) [m] and count.  None where they do not even fit beside the object."""
+        try:
+            report = verify_cage(self.problem.arrangement(fingers))
+        except InvalidProblem:
+            self.refuted += 1
+            return None
+        self.refuted += report.verdict == "escapes"
+        self.unconfirmed += report.verdict == "unknown"
+        return report
+
+    def keep(self, fingers: Array, report: CageReport, topology: tuple[Meeting, ...] = ()) -> None:
+        """Remember a verified cage if it is the best so far."""
+        value = objective(self.problem, fingers)
+        if not self.best.found or value < self.best.objective:
+            self.best = CageSolution(
+                status="caged",
+                fingers=fingers,
+                rotation_range=report.rotation_range,
+                topology=topology,
+                objective=value,
+            )
+
+
+def solve(
+    problem: CageProblem | Arrangement,
+    *,
+    time_limit: float = 60.0,
+    method: Method = "swept",
+    solver: Solver = "highs",
+) -> CageSolution:
+    """A verified cage, the best found within time_limit [s] where there is a cost (Thesis 5.1, reformulated).
+
+    Raises InvalidProblem for an arrangement whose fingers are given: there is nothing to solve.
+    """
+    if isinstance(problem, Arrangement):
+        raise InvalidProblem(
+            "fingers.count", expected="fingers to place", got="positions", remedy="verify it"
+        )
+    began = time.perf_counter()
+    tally = Tally(problem, began + time_limit)
+    for attempt in _attempts(problem, method):
+        if tally.left <= 0 or (tally.best.found and problem.cost == "none"):
+            break
+        if attempt is None:
+            _try_grasps(tally)
+        else:
+            _try_models(tally, attempt, solver)
+    return _answer(tally, time.perf_counter() - began)
+
+
+def _answer(tally: Tally, seconds: float) -> CageSolution:
+    best = tally.best
+    if not best.found:
+        stopped = tally.left <= 0 or tally.undecided
+        reason = (
+            "the time limit was reached before any cage was verified"
+            if stopped
+            else "no cage of the kind searched for within the rotation ranges tried; others may exist"
+        )
+        best = CageSolution(status="time_limit" if stopped else "none_found", reason=reason)
+    return replace(
+        best,
+        seconds=seconds,
+        attempts=tally.attempts,
+        refuted=tally.refuted,
+        unconfirmed=tally.unconfirmed,
+    )
+
+
+def _attempts(problem: CageProblem, method: Method) -> Iterator[Attempt | None]:
+    """Quick models, grasps (None), then models of growing size and time."""
+    ranges = problem.rotation or LADDER
+    plain = problem.cost == "none" and not problem.grippers and method != "model"
+    if problem.count + len(problem.fixed) + 2 * len(problem.walls) > 2:
+        for below, above in ranges[:QUICK]:
+            yield Attempt(below, above, 3, True, 0.4)
+    if plain:
+        yield None
+    for seconds in (1.0, 4.0, 16.0, 64.0):
+        for one_piece in (True, False):
+            for below, above in ranges:
+                yield Attempt(below, above, 99, one_piece, seconds)
+
+
+def _try_grasps(tally: Tally) -> None:
+    """Cages around immobilising grasps that hold even where each finger is off by half the margin."""
+    problem = tally.problem
+    if problem.count < 2:
+        return
+    slack = 0.5 * problem.margin * problem.shape.size
+    rng = np.random.default_rng(0)
+    for fingers in candidates(problem.shape.vertices, problem.count, problem.shape.size, rng):
+        if tally.left <= 0:
+            return
+        tally.attempts += 1
+        placed = to_world(problem.pose, fingers)
+        report = verify_cage(problem.arrangement(placed), slack=slack, cell_budget=400)
+        if report.verdict == "caged":
+            tally.keep(placed, report)
+            return
+
+
+def _try_models(tally: Tally, attempt: Attempt, solver: Solver) -> None:
+    """Solve one model for each order of the loop; verify, and cut off what is refuted."""
+    problem = tally.problem
+    frame = Frame.of(problem.shape, problem.pose)
+    clearance = problem.margin * problem.shape.size / frame.radius
+    geometry = SweptGeometry(frame.body(problem.shape.vertices), clearance, attempt.most_pieces)
+    for ring in rings(problem, frame):
+        for hub in range(max(1, len(ring) - 2) if len(ring) > 3 else 1):
+            if tally.left <= 0 or (tally.best.found and problem.cost == "none"):
+                return
+            model = SweptModel(
+                geometry, ring, (-attempt.below, attempt.above), hub=hub, one_piece=attempt.one_piece
+            )
+            if not model.feasible:
+                continue
+            _break_symmetry(model, problem)
+            require(model, problem, frame, solver)
+            _search(tally, model, frame, min(attempt.seconds, tally.left), solver)
+
+
+def _search(tally: Tally, model: SweptModel, frame: Frame, seconds: float, solver: Solver) -> None:
+    for _ in range(MOST_CUTS):
+        tally.attempts += 1
+        answer = model.solve(solver, max(seconds, 0.01))
+        if answer.x is None:
+            tally.undecided |= answer.status != "infeasible"
+            return
+        fingers = frame.world(
+            np.array([answer.x[model.finger(k)] for k in range(tally.problem.count)]).reshape(-1, 2)
+        )
+        report = tally.judge(fingers)
+        if report is not None and report.verdict == "caged":
+            tally.keep(fingers, report, _topology(model, answer))
+            return
+        model.cut(answer.x)
+
+
+def _topology(model: SweptModel, answer: Answer) -> tuple[Meeting, ...]:
+    assert answer.x is not None
+    keys, count = list(model.overlaps), len(model.ring)
+    chosen = answer.x[model.H].argmax(axis=1)
+    return tuple(
+        Meeting(element=n, piece=keys[k][0], next_element=(n + 1) % count, next_piece=keys[k][1])
+        for n, k in enumerate(chosen)
+    )
+
+
+def rings(problem: CageProblem, frame: Frame) -> Iterator[list[Element]]:
+    """Orders in which the loop may visit the searched fingers, and with them the fixed fingers or one wall."""
+    fixed = frame.relative(problem.fixed)
+    around = [Element(ends=np.stack([p, p])) for p in fixed[np.argsort(np.arctan2(*fixed.T[::-1]))]]
+    for order in _orders(problem):
+        free = [Element(finger=k) for k in order]
+        if len(free) + len(around) >= 2:
+            yield [*free, *around]
+        for a, b in frame.relative(problem.walls):
+            ends = np.stack([a, b])
+            yield [*free, *around, Element(ends=ends, joined=True), Element(ends=ends)]
+
+
+def _orders(problem: CageProblem) -> Iterator[tuple[int, ...]]:
+    """Cyclic orders of the searched fingers: one, unless grippers or a cost tell them apart."""
+    if not problem.grippers and problem.cost != "max_opening":
+        yield tuple(range(problem.count))
+        return
+    for rest in itertools.permutations(range(1, problem.count)):
+        yield (0, *rest)
+
+
+def _break_symmetry(model: SweptModel, problem: CageProblem) -> None:
+    if len(model.ring) > problem.count or problem.grippers or problem.cost == "max_opening":
+        return
+    if problem.count == 3:
+        model.leftmost_first([1, 2])
+    elif problem.count == 4 or problem.count == 2:
+        model.leftmost_first([problem.count // 2])
