@@ -19,7 +19,6 @@ from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
 from expert.types import IntArray
 
-
 MOST_STATES = 60_000
 """Joint states of all fingers that the automaton may have."""
 

@@ -17,7 +17,7 @@ from expert.contact.model import Model
 from expert.contact.plan_at import forces_at
 from expert.contact.qp import SOLVED, solve_qp
 from expert.contact.sequence import Sequence, nearest_region, standing_rows
-from expert.contact.steps import RIDGE, rays_per_end, step_program
+from expert.contact.steps import RIDGE, rays_per_end, solve_step, step_program
 from expert.geometry.pose import Array
 from expert.types import IntArray
 
@@ -25,6 +25,8 @@ STATIONARY = 1e-9
 """A plan is stationary when its own convex program moves no variable by more (rho, and lengths in L)."""
 PROXIMAL = 1e-6
 """Curvature, relative to the smoothing weight, towards the current point: settles flat directions, moves no fixed point."""
+MENDINGS, AROUND = 6, 0.01
+"""Programs that look for a plan near hopeless positions, and the width of rho around these that gives first forces."""
 ROUNDS, PATIENCE, HALVINGS = 60, 8, 25
 """Convex programs in all, those before Newton's method is tried, and step lengths tried after each."""
 
@@ -80,6 +82,54 @@ def polish(model: Model, sequence: Sequence, z: Array) -> Polished:
         else:
             break
     return Polished(z, cost, moves[-1] if moves else np.inf, len(moves))
+
+
+def mend(model: Model, sequence: Sequence, z: Array) -> tuple[Array, float]:
+    """A plan near positions that admit none: first-order programs from the forces that positions close by would take.
+
+    Free fingers go to the region that they miss least.  Returns the positions and their cost, inf without success.
+    """
+    weights = forces_around(model, sequence, z, AROUND)
+    for _ in range(MENDINGS):
+        program = first_order(model, sequence, z, weights, settle_regions(model, sequence, z))
+        status, v, _ = solve_qp(
+            program.H, program.g, program.A, program.b, program.equalities, 4 * model.iterations
+        )
+        if status != SOLVED:
+            break
+        before, z = z, _inside(sequence, v[: len(z)])
+        cost = forces_at(model, sequence, z).cost
+        if np.isfinite(cost):
+            return z, cost
+        if np.abs(z - before).max() <= STATIONARY:
+            break
+        for t in range(len(weights)):
+            used = v[program.first[t] : program.first[t + 1]]
+            weights[t, : len(used)] = np.maximum(used, 0.0)
+    return z, np.inf
+
+
+@njit(cache=True)
+def forces_around(model: Model, sequence: Sequence, z: Array, distance: float) -> Array:
+    """Ray weights (T, N) of the least-cost forces with every rho free to move by `distance` at each step; 0: none."""
+    T, C = sequence.modes.shape
+    each = rays_per_end(model)
+    weights = np.zeros((T, 3 * C + model.rays.shape[1]))
+    for t in range(T):
+        on = pushes(sequence, t)
+        lo = np.maximum(z[on] - distance, sequence.lo[on])
+        hi = np.minimum(z[on] + distance, sequence.hi[on])
+        status, _, _, _, x = solve_step(model, t, sequence.facet[on], lo, hi)
+        if status == SOLVED:
+            k = 0
+            for i in range(on.size):
+                for _ in range(1 if lo[i] == hi[i] else 2):
+                    for j in range(each):
+                        weights[t, each * i + j] += max(x[k], 0.0)
+                        k += 1
+            for e in range(x.size - k):
+                weights[t, each * on.size + e] = max(x[k + e], 0.0)
+    return weights
 
 
 def _stuck(moves: list[float]) -> bool:

@@ -15,7 +15,8 @@ import numpy as np
 from expert.contact.leaf import Relaxed, narrow, relax
 from expert.contact.model import Model
 from expert.contact.modes import Moves, cost_to_go, last_costs, moves_of, step_costs, window_costs
-from expert.contact.sequence import Sequence, least_smoothing, nearest_region, sequence_of
+from expert.contact.polish import mend
+from expert.contact.sequence import Sequence, least_smoothing, sequence_of
 from expert.geometry.pose import Array
 from expert.types import FREE, IntArray
 
@@ -182,8 +183,8 @@ class Search:
         if bound >= self.cutoff:
             self.pruned = min(self.pruned, bound)
             return
-        if found.intrusion[2] > 0:
-            self._dive(leaf, found.last)
+        if not np.isfinite(found.cost):
+            self._mend(leaf, found.last)
         for least, child in self._children(bound, leaf, found):
             self._push(least, child)
 
@@ -195,22 +196,11 @@ class Search:
             self.best = Best(found.cost, leaf.sequence, found.z)
         return found
 
-    def _dive(self, leaf: Leaf, z: Array) -> None:
-        """A plan early: send every free finger that is inside the object to the region it misses least."""
-        assigned = leaf.assigned.copy()
-        for _ in range(leaf.sequence.modes.size):
-            before = assigned.copy()
-            for t, c in np.argwhere((leaf.sequence.free >= 0) & (assigned < 0)):
-                v = leaf.sequence.free[t, c]
-                region, depth = nearest_region(self.model, t, z[v], z[v + 1])
-                if depth > 0:
-                    assigned[t, c] = region
-            if (assigned == before).all():
-                return
-            found = self._relax(Leaf(leaf.sequence, leaf.lo, leaf.hi, assigned))
-            if found.intrusion[2] == 0:
-                return
-            z = found.last
+    def _mend(self, leaf: Leaf, z: Array) -> None:
+        """A plan early: near the relaxation's solution, which has a finger inside the object or a step out of balance."""
+        z, cost = mend(self.model, leaf.sequence, z)
+        if cost < self.best.cost:
+            self.best = Best(cost, leaf.sequence, z)
 
     def _children(self, bound: float, leaf: Leaf, found: Relaxed) -> Iterator[tuple[float, Leaf]]:
         t, c, depth = found.intrusion
