@@ -313,12 +313,9 @@ def difference_batch(
     adjoint: np.ndarray,
     step: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The same by central differences: `step` [m] in positions, step * stiffness [N] in forces (the same commands).
-
-    A rollout starts anew only from the substep at which its commands first differ from those of the plan.
-    """
+    """The same by central differences: `step` [m] in positions, step * stiffness [N] in forces (the same commands)."""
     B, T, C = loaded.shape
-    gradient = np.zeros((2, B, T, C, 2))
+    d_positions, d_forces = np.zeros_like(positions), np.zeros_like(forces)
     work = work_for(C, scenes.walls.shape[1])
     S = (T - 1) * layers.substeps
     base, other = motion_for(S + 1, C), motion_for(S + 1, C)
@@ -326,57 +323,85 @@ def difference_batch(
     for b in range(B):
         if not acceptable(positions[b], forces[b]):
             continue
-        scene = view(scenes, b)
-        table = plan_commands(scene, scenes.path[b], positions[b], loaded[b], layers)
+        scene, path = view(scenes, b), scenes.path[b]
+        table = plan_commands(scene, path, positions[b], loaded[b], layers)
         command(table, positions[b], forces[b], scene.stiffness, commands)
         base.poses[0] = start[b]
         start_motion(table, positions[b], forces[b], base)
         if not advance(scene, physics, commands, 0, base, work):
             continue
         plan = np.stack((positions[b], forces[b]))
-        for which in range(2):
-            size = step if which == 0 else step * scene.stiffness
-            for t in range(T):
-                for c in range(C):
-                    for d in range(2):
-                        total = 0.0
-                        kept = plan[which, t, c, d]
+        for t in range(T):
+            for c in range(C):
+                bent = table.slope[t, c] != 0 or table.bend[t, c] != 0
+                same = not bent and acts_alike(table, t, c)
+                for d in range(2):
+                    for which in range(2):
+                        if which == 1 and same:
+                            d_forces[b, t, c, d] = d_positions[b, t, c, d] / scene.stiffness
+                            continue
+                        size = step if which == 0 else step * scene.stiffness
+                        total, kept = 0.0, plan[which, t, c, d]
                         for sign in (1.0, -1.0):
                             plan[which, t, c, d] = kept + sign * size
-                            if which == 0:
-                                table = plan_commands(scene, scenes.path[b], plan[0], loaded[b], layers)
-                            command(table, plan[0], plan[1], scene.stiffness, changed)
-                            first = _restart(table, plan, commands, changed, base, other)
-                            advance(scene, physics, changed, first, other, work)
+                            moved = table
+                            if which == 0 and bent:
+                                moved = plan_commands(scene, path, plan[0], loaded[b], layers)
+                            command(moved, plan[0], plan[1], scene.stiffness, changed)
+                            first = _restart(moved, plan, physics.damping, c, commands, changed, base, other)
+                            if first < S:
+                                advance(scene, physics, changed, first, other, work)
                             for k in range(first // layers.substeps + 1, T):
                                 i = k * layers.substeps
                                 for e in range(3):
                                     total += sign * adjoint[b, k, e] * (other.poses[i, e] - base.poses[i, e])
                         plan[which, t, c, d] = kept
-                        gradient[which, b, t, c, d] = total / (2 * size)
-            if which == 0:
-                table = plan_commands(scene, scenes.path[b], plan[0], loaded[b], layers)
-    return gradient[0], gradient[1]
+                        gradient = d_positions if which == 0 else d_forces
+                        gradient[b, t, c, d] = total / (2 * size)
+    return d_positions, d_forces
+
+
+@njit(cache=True)
+def acts_alike(table: Commands, t: int, c: int) -> bool:
+    """Whether force and position of finger c at knot t move the commands alike, and the start not at all."""
+    for i in range(len(table.knot)):
+        for side in range(2):
+            if table.knot[i, c, side] == t:
+                if table.weight[i, c, side] != table.force_weight[i, c, side]:
+                    return False
+                if i == 0 and table.weight[i, c, side] != 0:
+                    return False
+    return True
 
 
 @njit(cache=True)
 def _restart(
     table: Commands,
     plan: np.ndarray,
+    damping: float,
+    c: int,
     commands: np.ndarray,
     changed: np.ndarray,
     base: Motion,
     other: Motion,
 ) -> int:
-    """Substep from which the changed commands act, with the state there copied from the unchanged motion."""
+    """Substep from which the changed commands of finger c act, with the state there copied from the unchanged motion.
+
+    The number of substeps where they never do, because the finger is away from the object while they differ.
+    """
     S = len(commands) - 1
-    first = 0
     other.poses[0] = base.poses[0]
     start_motion(table, plan[0], plan[1], other)
-    if not (other.fingers[0] == base.fingers[0]).all():
-        return 0
-    while first < S and (commands[first + 1] == changed[first + 1]).all():
-        first += 1
-    other.poses[first], other.velocities[first] = base.poses[first], base.velocities[first]
-    other.fingers[first] = base.fingers[first]
+    first, last = 0, S
+    if (other.fingers[0] == base.fingers[0]).all():
+        while first < S and (commands[first + 1] == changed[first + 1]).all():
+            first += 1
+    while damping == 0 and last > first and (commands[last] == changed[last]).all():
+        last -= 1
+    # A finger without mass and damper forgets within a step where it has been.
+    if not base.near[first : min(last + 1, S), c].any():
+        return S
+    if first > 0:
+        other.poses[first], other.velocities[first] = base.poses[first], base.velocities[first]
+        other.fingers[first] = base.fingers[first]
     return first

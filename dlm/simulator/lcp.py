@@ -11,12 +11,12 @@ OPEN, STICK, SLIP_PLUS, SLIP_MINUS = 0, 1, 2, 3
 """State of a contact: P = 0; y = 0; y_n = 0 and P_t = +mu P_n or -mu P_n."""
 ROWS = np.array([0, 2, 1, 1])
 """Equations of a contact by state."""
-SWEEPS = 6
+SWEEPS = 3
 NEWTON = 12
 FALLBACK_SWEEPS = 200
 
 
-ROW = np.dtype([(name, "f8") for name in ("x", "y", "turn", "c", "P", "rhs", "saved")])
+ROW = np.dtype([(name, "f8") for name in ("x", "y", "turn", "c", "P", "rhs", "saved", "inverse")])
 """Row of the problem: direction and lever (the contact Jacobian), c, impulse, and scratch for the linear system."""
 
 
@@ -45,13 +45,15 @@ def solve_contacts(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray
 def sweep(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray, sweeps: int) -> None:
     """Projected Gauss-Seidel, contact by contact."""
     m = 2 * n
+    for r in range(m):
+        rows[r].inverse = 1 / A[r, r]
     for _ in range(sweeps):
         for i in range(n):
             for r in (2 * i, 2 * i + 1):
                 y = rows[r].c
                 for s in range(m):
                     y += A[r, s] * rows[s].P
-                p = rows[r].P - y / A[r, r]
+                p = rows[r].P - y * rows[r].inverse
                 if r == 2 * i:
                     rows[r].P = max(p, 0.0)
                 else:

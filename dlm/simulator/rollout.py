@@ -16,12 +16,16 @@ from dlm.simulator.step import Work, solve_step, work_for
 
 
 class Motion(NamedTuple):
-    """States at every substep: poses and velocities (S + 1, 3), fingers (S + 1, C, 2), exact (S,) LCP solutions."""
+    """States at every substep: poses and velocities (S + 1, 3), fingers (S + 1, C, 2).
+
+    exact (S,): the contact problem was solved exactly; near (S, C): the finger was near enough to take part in it.
+    """
 
     poses: np.ndarray
     velocities: np.ndarray
     fingers: np.ndarray
     exact: np.ndarray
+    near: np.ndarray
 
 
 @njit(cache=True)
@@ -32,6 +36,7 @@ def motion_for(samples: int, fingers: int) -> Motion:
         np.zeros((samples, 3)),
         np.zeros((samples, fingers, 2)),
         np.ones(samples - 1, np.bool_),
+        np.zeros((samples - 1, fingers), np.bool_),
     )
 
 
@@ -46,7 +51,12 @@ def advance(
     h = scene.dt / physics.substeps
     for i in range(start, len(commands) - 1):
         q, v, p = motion.poses[i], motion.velocities[i], motion.fingers[i]
-        _, motion.exact[i] = solve_step(scene, physics, q, v, p, commands[i + 1], work)
+        n, motion.exact[i] = solve_step(scene, physics, q, v, p, commands[i + 1], work)
+        for c in range(len(p)):
+            motion.near[i, c] = False
+        for k in range(n):
+            if work.contacts[k].finger >= 0:
+                motion.near[i, work.contacts[k].finger] = True
         for d in range(3):
             motion.velocities[i + 1, d] = work.velocity[d]
             motion.poses[i + 1, d] = q[d] + h * work.velocity[d]
@@ -63,11 +73,12 @@ def advance(
 @njit(cache=True)
 def finite(motion: Motion, i: int) -> bool:
     """Whether state i is made of finite numbers."""
-    return (
-        np.isfinite(motion.poses[i]).all()
-        and np.isfinite(motion.velocities[i]).all()
-        and np.isfinite(motion.fingers[i]).all()
-    )
+    total = 0.0
+    for d in range(3):
+        total += abs(motion.poses[i, d]) + abs(motion.velocities[i, d])
+    for c in range(motion.fingers.shape[1]):
+        total += abs(motion.fingers[i, c, 0]) + abs(motion.fingers[i, c, 1])
+    return np.isfinite(total)
 
 
 @njit(cache=True)
