@@ -1,7 +1,13 @@
 PYTHON ?= python3
 BIN := .venv/bin
-# `make demo EXPERIMENT=smoke` goes through the same steps on 6 tasks and 2 iterations, in a minute.
+# `make demo EXPERIMENT=smoke` goes through the same steps on four tasks and two iterations, in about a minute.
 EXPERIMENT ?= thesis
+ifeq ($(EXPERIMENT),smoke)
+DATASETS := smoke
+TRAIN := schedule.iterations=2
+else
+DATASETS := train finetune test family
+endif
 
 .PHONY: setup demo report test lint bench gallery clean
 setup: .venv/installed
@@ -14,8 +20,8 @@ setup: .venv/installed
 	touch $@
 
 demo: setup
-	$(BIN)/python -m datasets.generate experiment=$(EXPERIMENT)
-	$(BIN)/python train.py stage=all experiment=$(EXPERIMENT) resume=true
+	for name in $(DATASETS); do $(BIN)/python -m datasets.generate dataset=$$name || exit $$?; done
+	$(BIN)/python train.py stage=all experiment=$(EXPERIMENT) $(TRAIN)
 	$(BIN)/python evaluate.py experiment=$(EXPERIMENT)
 
 report: setup

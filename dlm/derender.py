@@ -24,12 +24,18 @@ class NetworkSizes:
 
 
 def perceptron(inputs: int, outputs: int, sizes: NetworkSizes) -> nn.Sequential:
-    """Map of rows (n, inputs) to (n, outputs); batch norm, ReLU and dropout after each hidden layer."""
+    """Map of rows (n, inputs) to (n, outputs); batch norm, ReLU and dropout after each hidden layer.
+
+    The last layer starts at zero: what an untrained perceptron adds to a mean answer is nothing rather than noise.
+    """
     hidden = [
         (nn.Linear(inputs, inputs), nn.BatchNorm1d(inputs), nn.ReLU(), nn.Dropout(sizes.dropout))
         for _ in range(sizes.hidden_layers)
     ]
-    return nn.Sequential(*chain.from_iterable(hidden), nn.Linear(inputs, outputs))
+    last = nn.Linear(inputs, outputs)
+    nn.init.zeros_(last.weight)
+    nn.init.zeros_(last.bias)
+    return nn.Sequential(*chain.from_iterable(hidden), last)
 
 
 class VideoEncoder(nn.Module):

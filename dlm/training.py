@@ -3,7 +3,9 @@
 A stage can be stopped at any moment; continued from its last checkpoint it takes exactly the steps that it would have taken.
 """
 
-from collections.abc import Callable, Mapping
+import shutil
+import sys
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,7 +41,7 @@ class Schedule:
     """iterations: passes over the tasks.  log_every, save_every: iterations between curve points and between checkpoints."""
 
     iterations: int = 100
-    batch_size: int = 20
+    batch_size: int = 5
     learning_rate: float = 1e-4
     log_every: int = 5
     save_every: int = 5
@@ -71,6 +73,10 @@ class Training:
         losses = [self._descend(self.tasks[rows]) for rows in self._batches()]
         self.iteration += 1
         return sum(losses) / len(losses)
+
+    def is_due(self, every: int) -> bool:
+        """Whether what happens every so many iterations, and after the last one, happens now."""
+        return self.iteration % every == 0 or self.iteration == self.schedule.iterations
 
     def _batches(self) -> list[torch.Tensor]:
         """Random batches of equal sizes up to one: batch norm needs more than one task in each."""
@@ -132,22 +138,38 @@ def fit(
     resume: bool,
 ) -> None:
     """Train to the end of the schedule, with a checkpoint at `path` and curves for TensorBoard beside it."""
-    schedule = training.schedule
-    with seeded(schedule.seed):
+    curves = path.parent / "tensorboard" / stage.name
+    with seeded(training.schedule.seed):
         if resume and path.exists():
             training.restore(checked(path, stage, training.tasks, settings), path=path, model=model)
-        writer = SummaryWriter(str(path.parent / "tensorboard" / stage.name), purge_step=training.iteration)
-        with writer, _progress() as progress:
-            bar = progress.add_task(stage.name, total=schedule.iterations, completed=training.iteration)
-            while training.iteration < schedule.iterations:
-                loss = training.iterate()
-                last = training.iteration == schedule.iterations
-                if last or training.iteration % schedule.log_every == 0 or training.iteration == 1:
-                    _log(training, loss, watch, writer)
-                if last or training.iteration % schedule.save_every == 0:
-                    training.checkpoint(stage, model, settings).save(path)
-                progress.update(bar, completed=training.iteration, description=f"{stage.name} {loss:.3g}")
+        else:
+            shutil.rmtree(curves, ignore_errors=True)
+        with SummaryWriter(str(curves), purge_step=training.iteration + 1) as writer:
+            try:
+                for loss in _iterations(training, stage.name):
+                    if training.is_due(training.schedule.log_every) or training.iteration == 1:
+                        _log(training, loss, watch, writer)
+                    if training.is_due(training.schedule.save_every):
+                        training.checkpoint(stage, model, settings).save(path)
+            except KeyboardInterrupt:
+                again = f"resume=true goes on from {path}" if path.exists() else "nothing was saved yet"
+                print(
+                    f"interrupted after {training.iteration} iterations of {stage.name}; {again}",
+                    file=sys.stderr,
+                )
+                raise
             writer.add_figure("scene", watch.picture(training.policy), training.iteration)
+
+
+def _iterations(training: Training, title: str) -> Iterator[float]:
+    """Losses of the iterations that are left, with a progress bar."""
+    total = training.schedule.iterations
+    with _progress() as progress:
+        bar = progress.add_task(title, total=total, completed=training.iteration)
+        while training.iteration < total:
+            loss = training.iterate()
+            yield loss
+            progress.update(bar, completed=training.iteration, description=f"{title} {loss:.3g}")
 
 
 def checked(path: Path, stage: Stage, tasks: TaskBatch, settings: Mapping[str, object]) -> Checkpoint:

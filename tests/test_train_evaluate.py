@@ -1,0 +1,280 @@
+"""The commands as a user runs them: data by the expert, five stages, a kill, tables and report; then everything that can be wrong."""
+
+import csv
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from omegaconf import DictConfig
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+import evaluate
+import train
+from datasets.store import read_manifest, write_manifest
+from dlm.checkpoint import load, read_about
+
+ROOT = Path(__file__).resolve().parent.parent
+STAGES = ["nn", "nnm", "mdr", "cvx", "dlm"]
+QUICK = ["experiment=smoke", "schedule.iterations=2", "schedule.log_every=1"]
+CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+
+
+def start(script: str, *arguments: str, cwd: Path) -> subprocess.Popen[str]:
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(
+        [sys.executable, str(ROOT / script), *arguments],
+        cwd=cwd,
+        env=environment,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+
+
+def finish(process: subprocess.Popen[str]) -> str:
+    """Output of a command that must succeed without a word on stderr."""
+    output, errors = process.communicate(timeout=300)
+    assert (process.returncode, errors) == (0, "")
+    return output
+
+
+@pytest.fixture(scope="module")
+def workplace(data_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with data/smoke-seed0 and five trained stages under runs/smoke."""
+    folder = tmp_path_factory.mktemp("work")
+    (folder / "data").symlink_to(data_folder / "data")
+    output = finish(start("train.py", "stage=all", *QUICK, cwd=folder))
+    assert "next: python evaluate.py output=runs/smoke" in output
+    return folder
+
+
+@pytest.fixture(scope="module")
+def results(workplace: Path) -> Path:
+    """runs/smoke with tables and report."""
+    output = finish(start("evaluate.py", "experiment=smoke", "examples=1", cwd=workplace))
+    assert output.rstrip().endswith(f"report: {workplace / 'runs' / 'smoke' / 'report.html'}")
+    return workplace / "runs" / "smoke"
+
+
+def test_every_stage_leaves_a_checkpoint_that_says_what_made_it(workplace: Path) -> None:
+    for stage in STAGES:
+        about = read_about(workplace / "runs" / "smoke" / "seed_0" / f"{stage}.safetensors", command="")
+        assert (about.stage, about.model, about.iteration) == (stage, "thesis", 2)
+        assert about.data == read_manifest(workplace / "data" / "smoke-seed0")["sha256"]
+        assert [row["iteration"] for row in about.history] == [1, 2]
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_tensorboard_shows_curves_and_scenes(workplace: Path, stage: str) -> None:
+    events = EventAccumulator(str(workplace / "runs" / "smoke" / "seed_0" / "tensorboard" / stage))
+    events.Reload()
+    names = {f"{kind}/{d}" for kind in ("object", "finger") for d in ("train", "finetune", "test", "family")}
+    assert set(events.Tags()["scalars"]) == {"loss", *names}
+    assert [event.step for event in events.Scalars("object/test")] == [1, 2]
+    about = read_about(workplace / "runs" / "smoke" / "seed_0" / f"{stage}.safetensors", command="")
+    logged = [event.value for event in events.Scalars("loss")]
+    assert logged == pytest.approx([row["loss"] for row in about.history], rel=1e-6)
+    assert events.Tags()["images"] == ["scene"]
+
+
+def test_the_table_has_all_rows_and_columns(results: Path) -> None:
+    lines = json.loads((results / "table_4_1.json").read_text())["lines"]
+    models = ["no action", "NN", "NNM", "MDR", "CVX", "DLM", "MIQP (oracle)"]
+    assert [line["model"] for line in lines] == models
+    for line in lines:
+        assert list(line["cells"]) == ["train", "finetune", "test", "family"]
+        assert (line["forward"] is None) == (line["model"] == "no action")
+        assert (line["backward"] is None) == (line["model"] in ("no action", "MIQP (oracle)"))
+    idle, oracle = lines[0]["cells"]["train"], lines[-1]["cells"]["train"]
+    assert idle["ratio"] == 1
+    assert idle["within"] == 0
+    assert oracle["within"] == 1
+    assert oracle["loss"] < 1e-2 * idle["loss"]
+    assert oracle["finger_loss"] == 0
+
+
+def test_markdown_and_csv_say_the_same_as_json(results: Path) -> None:
+    lines = json.loads((results / "table_4_1.json").read_text())["lines"]
+    records = list(csv.DictReader((results / "table_4_1.csv").read_text().splitlines()))
+    assert len(records) == 7 * 4
+    for line in lines:
+        for dataset, cell in line["cells"].items():
+            record = next(r for r in records if (r["model"], r["dataset"]) == (line["model"], dataset))
+            assert float(record["loss"]) == cell["loss"]
+            assert int(record["dropped"]) == sum(map(len, cell["dropped"]))
+    rows = [row for row in (results / "table_4_1.md").read_text().splitlines() if row.startswith("| DLM |")]
+    shown = re.findall(r"[\d.e+-]+", rows[0])
+    assert float(shown[0]) == pytest.approx(lines[5]["cells"]["train"]["loss"], abs=5e-4)
+
+
+def test_the_report_needs_no_network(results: Path) -> None:
+    page = (results / "report.html").read_text()
+    outside = re.findall(r'(?:src|href)="(?!data:)[^"]*"|url\((?!data:)|@import', page)
+    assert outside == []
+    assert page.count("<animate ") > 10
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to open the report in")
+def test_the_report_opens_in_a_browser(results: Path, tmp_path: Path) -> None:
+    answer = subprocess.run(
+        [
+            str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}",
+            "--enable-logging=stderr", "--virtual-time-budget=2000", "--dump-dom", f"file://{results / 'report.html'}",
+        ],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    assert "CONSOLE" not in answer.stderr
+    models = 6
+    assert answer.stdout.count("<svg ") == 2 * models  # an example of the family and one of the test set
+    assert answer.stdout.count("<img ") == 1 + 2 * 2  # curves; video and strip of each example
+    assert answer.stdout.count("<table>") >= 7
+    assert answer.stdout.rstrip().endswith("</html>")
+
+
+def test_the_same_seed_gives_the_same_losses_also_after_a_kill(workplace: Path) -> None:
+    schedule = ["schedule.iterations=8", "schedule.log_every=1", "schedule.save_every=1"]
+
+    def command(output: str, *more: str) -> list[str]:
+        return ["stage=mdr", "seed=3", "experiment=smoke", f"output={output}", *schedule, *more]
+
+    runs = [start("train.py", *command(name), cwd=workplace) for name in ("one", "two", "killed")]
+    kill_once_saved(runs[2], workplace / "killed" / "seed_3" / "mdr.safetensors")
+    for run in runs[:2]:
+        finish(run)
+    finish(start("train.py", *command("killed", "resume=true"), cwd=workplace))
+    one, two, killed = (
+        read_about(workplace / name / "seed_3" / "mdr.safetensors", command="").history
+        for name in ("one", "two", "killed")
+    )
+    assert len(one) == 8
+    assert two == one
+    assert killed == one
+
+
+def kill_once_saved(process: subprocess.Popen[str], path: Path) -> None:
+    """Kill without warning as soon as there is a first checkpoint."""
+    deadline = time.monotonic() + 120
+    while not path.exists() and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.kill()
+    process.communicate()
+    assert process.returncode == -signal.SIGKILL
+    assert load(path, command="").about.iteration < 8
+
+
+def test_an_interrupt_ends_with_one_line_that_says_how_to_go_on(workplace: Path) -> None:
+    process = start(
+        "train.py", "stage=mdr", "experiment=smoke", "output=stopped", "schedule.save_every=1", cwd=workplace
+    )
+    path = workplace / "stopped" / "seed_0" / "mdr.safetensors"
+    deadline = time.monotonic() + 120
+    while not path.exists() and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors.count("\n") == 1
+    assert "interrupted" in errors
+    assert "resume=true" in errors
+    assert load(path, command="").about.stage == "mdr"
+
+
+@pytest.fixture
+def ask(
+    workplace: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., tuple[object, str]]:
+    """Run train or evaluate here, with arguments; the exit code and what it says on stderr."""
+    monkeypatch.chdir(workplace)
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "1")
+
+    def run(main: Callable[[], None], *arguments: str) -> tuple[object, str]:
+        monkeypatch.setattr(sys, "argv", ["command.py", *arguments])
+        with pytest.raises(SystemExit) as exit_:
+            main()
+        return exit_.value.code, capsys.readouterr().err
+
+    return run
+
+
+def mistake(folder: Path, name: str) -> None:
+    """Prepare `folder/bad`, a copy of the results of training, with one thing wrong."""
+    source, bad = folder / "runs" / "smoke" / "seed_0", folder / "bad" / "seed_0"
+    shutil.rmtree(folder / "bad", ignore_errors=True)
+    shutil.copytree(source, bad, ignore=shutil.ignore_patterns("tensorboard"))
+    if name == "another model":
+        shutil.copy(source / "nn.safetensors", bad / "mdr.safetensors")
+    elif name == "truncated":
+        whole = (bad / "cvx.safetensors").read_bytes()
+        (bad / "cvx.safetensors").write_bytes(whole[: len(whole) // 2])
+    elif name == "missing":
+        (bad / "mdr.safetensors").unlink()
+    elif name == "empty data":
+        empty = folder / "empty"
+        write_manifest(empty, {**read_manifest(folder / "data" / "smoke-seed0"), "shards": [], "tasks": 0})
+
+
+TRAIN, EVALUATE = train.main, evaluate.main
+SMOKE, BAD = "experiment=smoke", "output=bad"
+
+WRONG: dict[str, tuple[Callable[[], None], list[str], str]] = {
+    "unknown stage": (TRAIN, [SMOKE, "stage=dml"], r"stage/dml.*all cvx dlm mdr nn nnm"),
+    "unknown model": (TRAIN, [SMOKE, "model=bigger"], r"model/bigger.*thesis"),
+    "unknown option": (TRAIN, [SMOKE, "iterations=5"], r"iterations"),
+    "unknown torque": (TRAIN, [SMOKE, "solver.torque=exact"], r"torque: expected first_order or thesis, got exact"),
+    "no iterations": (TRAIN, [SMOKE, "schedule.iterations=0"], r"iterations: expected a whole number >= 1, got 0"),
+    "negative kappa": (TRAIN, [SMOKE, "simulator.kappa=-1"], r"kappa: expected a positive number"),
+    "missing data": (TRAIN, ["stage=nn", BAD], r"data/train-seed0.*python -m datasets\.generate"),
+    "empty data": (TRAIN, [SMOKE, "stage=nn", "data.train=empty", BAD], r"at least one shard"),
+    "missing": (TRAIN, [SMOKE, "stage=cvx", BAD], r"mdr\.safetensors.*python train\.py stage=mdr model=thesis seed=0"),
+    "truncated": (TRAIN, [SMOKE, "stage=dlm", BAD], r"cvx\.safetensors: expected a whole checkpoint"),
+    "another model": (TRAIN, [SMOKE, "stage=cvx", BAD], r"mdr\.safetensors: expected"),
+    "other settings": (TRAIN, [SMOKE, "stage=nn", BAD, "resume=true", "schedule.learning_rate=1e-3"], r"learning_rate"),
+    "nothing trained": (EVALUATE, [SMOKE, "output=nowhere"], r"nowhere/seed_0/nn\.safetensors.*python train\.py stage=nn"),
+    "no seeds": (EVALUATE, [SMOKE, "seeds=[]"], r"seeds: expected at least one seed"),
+    "one stage another": (EVALUATE, [SMOKE, BAD], r"mdr\.safetensors: expected stage mdr, got stage nn"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_bad_input_gets_one_line_and_code_2_and_destroys_nothing(
+    name: str, workplace: Path, ask: Callable[..., tuple[object, str]]
+) -> None:
+    mistake(workplace, "another model" if name == "one stage another" else name)
+    files = {p: p.read_bytes() for p in (workplace / "bad").rglob("*") if p.is_file()}
+    command, arguments, words = WRONG[name]
+    code, said = ask(command, *arguments)
+    assert code == 2
+    assert re.fullmatch(r"error: [^\n]+\n", said)
+    assert re.search(words, said)
+    assert {p: p.read_bytes() for p in (workplace / "bad").rglob("*") if p.is_file()} == files
+
+
+def groups() -> list[tuple[str, str]]:
+    """Every option of every configuration group, with a command that takes it."""
+    owner = {"dataset": "generate"}
+    return [
+        (owner.get(path.parent.name, "train"), f"{path.parent.name}={path.stem}")
+        for path in sorted((ROOT / "configs").glob("*/*.yaml"))
+        if path.stem != "common"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("command", "choice"), [*groups(), ("train", ""), ("evaluate", ""), ("generate", ""), ("evaluate", "data=smoke")]
+)  # fmt: skip
+def test_every_configuration_composes_without_gaps(
+    command: str, choice: str, composed: Callable[..., DictConfig]
+) -> None:
+    from omegaconf import OmegaConf
+
+    configuration = composed(command, *[choice] if choice else [])
+    plain = OmegaConf.to_container(configuration, resolve=True, throw_on_missing=True)
+    assert "seed" in plain or "seeds" in plain
