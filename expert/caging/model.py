@@ -4,7 +4,7 @@ filled loop at its ends.  All lengths relative (`expert.caging.frame`).
 p[n]          finger n                                H[n][i, j]   exit piece i of n meets entry piece j of n + 1
 R[n, r]       region of finger n at the start         W[n, r, (i, j)] = 1 iff finger n is in region r with entry i, exit j
 k[n]          full turns between exit of n and entry of n + 1
-y[e][t]       points that fill the loop at limit e in {L, U}; triangle t of a fan
+y             points that fill the loop at L and at U, one for each triangle of it
 
 Why a solution is a cage: the loop of overlapping pieces exists at every orientation of [L, U] and moves continuously, it
 winds once around the start, and at L and U it can be contracted inside the obstacles, so the free component of the start
@@ -13,6 +13,7 @@ cannot reach either end, nor cross the loop in between (docs/caging.md).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -39,8 +40,24 @@ class Element:
     joined: bool = False
 
 
+Part = Literal["entry", "exit", "both"]
+
+
+def triangles(count: int, hub: int) -> list[list[tuple[int, Part]]]:
+    """Elements and their pieces that share a point where the loop is filled.
+
+    Three and more elements: a fan about element `hub`.  Two: the loop entry 0, exit 0, entry 1, exit 1 is cut along the
+    exits (hub 0) or along the entries (hub 1).
+    """
+    if count == 2:
+        part: Part = "entry" if hub else "exit"
+        return [[(0, "both"), (1, part)], [(1, "both"), (0, part)]]
+    corners = [(hub % count, (hub + t) % count, (hub + t + 1) % count) for t in range(1, count - 1)]
+    return [[(c, "both") for c in corner] for corner in corners]
+
+
 class SweptModel:
-    """Variables and constraints for one range of orientations; `hub` is the fan's apex at the lower limit.
+    """Variables and constraints for one range of orientations; `hubs` say how the loop is filled at its ends.
 
     one_piece: the loop enters and leaves each finger by the same piece: a smaller model with fewer solutions.
     """
@@ -51,7 +68,7 @@ class SweptModel:
         ring: Sequence[Element],
         limits: tuple[float, float],
         *,
-        hub: int = 0,
+        hubs: tuple[int, int] = (0, 0),
         one_piece: bool = False,
     ) -> None:
         self.geometry, self.ring, self.limits = geometry, tuple(ring), limits
@@ -67,8 +84,8 @@ class SweptModel:
             self._choose_regions_and_pieces()
             self._loop()
             self._winding()
-            self._fill(0, hub)
-            self._fill(1, 0)
+            self._fill(0, hubs[0])
+            self._fill(1, hubs[1])
 
     def finger(self, index: int) -> IntArray:
         """Variables (2,) of a searched finger."""
@@ -148,23 +165,20 @@ class SweptModel:
         m.equal([(1.0, k)], 1.0)
 
     def _fill(self, end: int, hub: int) -> None:
-        """At a limit, triangle t of the fan (hub, hub+t+1, hub+t+2) has a point common to the pieces of its fingers."""
-        m, n = self.milp, self.count
+        """At a limit each triangle has a point y in the pieces named for it: R^T (p - y) in the piece, W deciding which."""
         turn = rotation(self.limits[end])
-        triangles = max(1, n - 2)
-        y = m.add((triangles, 2), -2 * REACH, 2 * REACH)
-        for t in range(triangles):
-            corners = sorted({hub % n, (hub + t + 1) % n, (hub + t + 2) % n}) if n > 2 else [0, 1]
-            for c in corners:
-                f = m.add((len(self.pairs), 2), -2 * REACH, 2 * REACH)
-                # R^T (p - y) = sum f, row by row of R^T
+        for triangle in triangles(self.count, hub):
+            y = self.milp.add((2,), -2 * REACH, 2 * REACH)
+            for c, part in triangle:
+                f = self.milp.add((len(self.pairs), 2), -2 * REACH, 2 * REACH)
                 for d in range(2):
-                    m.equal([(turn[:, d], self.p[c]), (-turn[:, d], y[t]), (-1.0, f[:, d])], 0.0)
+                    terms: list[Term] = [(turn[:, d], self.p[c]), (-turn[:, d], y), (-1.0, f[:, d])]
+                    self.milp.equal(terms, 0.0)
                 for q, (i, j) in enumerate(self.pairs):
-                    A, b = self.geometry.common(i, j)
-                    rows = len(b)
-                    chosen = np.broadcast_to(self.W[c, :, q], (rows, self.W.shape[1]))
-                    m.at_most([(A, np.broadcast_to(f[q], (rows, 2))), (-b[:, None], chosen)], np.zeros(rows))
+                    A, b = self.geometry.common(*{"entry": (i, i), "exit": (j, j), "both": (i, j)}[part])
+                    inside = np.broadcast_to(f[q], A.shape)
+                    chosen = np.broadcast_to(self.W[c, :, q], (len(b), self.W.shape[1]))
+                    self.milp.at_most([(A, inside), (-b[:, None], chosen)], np.zeros(len(b)))
 
     def leftmost_first(self, others: Sequence[int]) -> None:
         """Break the symmetry of renaming: element 0 is left of the others."""

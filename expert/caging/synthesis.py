@@ -137,14 +137,15 @@ def _answer(tally: Tally, seconds: float) -> CageSolution:
 def _attempts(problem: CageProblem, method: Method) -> Iterator[Attempt | None]:
     """Quick models, grasps (None), then models of growing size and time."""
     ranges = problem.rotation or LADDER
-    plain = problem.cost == "none" and not problem.grippers and method != "model"
-    if problem.count + len(problem.fixed) + 2 * len(problem.walls) > 2:
+    plain = problem.cost == "none" and not problem.grippers and not len(problem.walls)
+    elements = problem.count + len(problem.fixed) + 2 * len(problem.walls)
+    if elements > 2:
         for below, above in ranges[:QUICK]:
-            yield Attempt(below, above, 3, True, 0.4)
-    if plain:
+            yield Attempt(below, above, 3, True, 0.4 if plain else 1.5)
+    if plain and method != "model":
         yield None
-    for seconds in (1.0, 4.0, 16.0, 64.0):
-        for one_piece in (True, False):
+    for seconds in (1.0, 4.0, 16.0, 64.0) if plain else (1.5, 6.0, 24.0):
+        for one_piece in (True, False) if elements > 2 else (False,):
             for below, above in ranges:
                 yield Attempt(below, above, 99, one_piece, seconds)
 
@@ -174,11 +175,12 @@ def _try_models(tally: Tally, attempt: Attempt, solver: Solver) -> None:
     clearance = problem.margin * problem.shape.size / frame.radius
     geometry = SweptGeometry(frame.body(problem.shape.vertices), clearance, attempt.most_pieces)
     for ring in rings(problem, frame):
-        for hub in range(max(1, len(ring) - 2) if len(ring) > 3 else 1):
+        alike = len(ring) == problem.count and not _labelled(problem)
+        for hubs in _hubs(len(ring), alike):
             if tally.left <= 0 or (tally.best.found and problem.cost == "none"):
                 return
             model = SweptModel(
-                geometry, ring, (-attempt.below, attempt.above), hub=hub, one_piece=attempt.one_piece
+                geometry, ring, (-attempt.below, attempt.above), hubs=hubs, one_piece=attempt.one_piece
             )
             if not model.feasible:
                 continue
@@ -227,17 +229,36 @@ def rings(problem: CageProblem, frame: Frame) -> Iterator[list[Element]]:
             yield [*free, *around, Element(ends=ends, joined=True), Element(ends=ends)]
 
 
+def _labelled(problem: CageProblem) -> bool:
+    """Whether searched fingers differ from one another."""
+    return bool(problem.grippers) or problem.cost == "max_opening"
+
+
 def _orders(problem: CageProblem) -> Iterator[tuple[int, ...]]:
     """Cyclic orders of the searched fingers: one, unless grippers or a cost tell them apart."""
-    if not problem.grippers and problem.cost != "max_opening":
+    if not _labelled(problem):
         yield tuple(range(problem.count))
+        return
+    if problem.parallel and problem.count == 4 and len(problem.grippers) == 2:
+        (a, b), (c, d) = (gripper.fingers for gripper in problem.grippers)
+        yield (a, b, d, c)  # the first gripper below the second, counter-clockwise
+        yield (c, d, b, a)
         return
     for rest in itertools.permutations(range(1, problem.count)):
         yield (0, *rest)
 
 
+def _hubs(count: int, alike: bool) -> list[tuple[int, int]]:
+    """Ways to fill the loop at L and U.  Where elements are alike, renaming lets the fan at U start at element 0."""
+    if count == 3:
+        return [(0, 0)]
+    ways = range(2 if count in (2, 4) else count)  # on a square, opposite corners span the same diagonal
+    pairs = [(a, b) for a in ways for b in ways if not alike or count == 2 or b == 0]
+    return sorted(pairs, key=lambda p: p[0] == p[1])
+
+
 def _break_symmetry(model: SweptModel, problem: CageProblem) -> None:
-    if len(model.ring) > problem.count or problem.grippers or problem.cost == "max_opening":
+    if len(model.ring) > problem.count or _labelled(problem):
         return
     if problem.count == 3:
         model.leftmost_first([1, 2])
