@@ -1,0 +1,78 @@
+"""Which features touch, against shapely-free geometry that shares no code with the kernels."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from datasets.shapes import Shapes, sample_polygon
+from dlm.simulator import SceneBatch, SimulatorSettings
+from dlm.simulator.contact import CONTACT, FACET, WALL, activation, collect, nearest, view
+from expert.geometry.polygon import signed_distance
+from expert.types import Body
+from tests.dlm.simulator.scenes import T, scene
+
+U_SHAPE = np.array([[0, 0], [6, 0], [6, 4], [4, 4], [4, 2], [2, 2], [2, 4], [0, 4]]) * 0.01
+REST = np.zeros(3)
+
+
+def facets_of(vertices):
+    return view(
+        SceneBatch.of([scene(Body(vertices=vertices, mass=0.1, inertia=1e-4), np.zeros((T, 3)))]).arrays, 0
+    )
+
+
+def contacts_at(vertices, finger, pose=REST):
+    s, out = facets_of(vertices), np.zeros(10, CONTACT)
+    fingers = np.array([finger], dtype=float)
+    n = collect(s, SimulatorSettings().physics, pose, np.zeros(3), fingers, np.zeros((1, 2)), out)
+    return out[:n]
+
+
+@settings(deadline=None)
+@given(st.integers(0, 10_000), st.integers(3, 12), st.tuples(*[st.floats(-0.1, 0.1)] * 2))
+def test_signed_distance_agrees_with_the_geometry_package(seed, facets, point):
+    shapes = Shapes(facets=(facets, facets), shortest_facet=0.2, deepest_dent=1.0, slightest_turn=0.05)
+    vertices = sample_polygon(np.random.default_rng(seed), shapes)
+    _, _, distance = nearest(facets_of(vertices).facets, *point)
+    assert distance == pytest.approx(float(signed_distance(vertices, np.array(point))), abs=1e-12)
+
+
+def test_a_finger_in_a_concave_corner_touches_both_facets():
+    corner = contacts_at(U_SHAPE, [0.0201, 0.0201])
+    touching = corner[corner["wall"] < 0]
+    assert sorted(touching["feature"]) == [4, 5]
+    assert (touching["kind"] == FACET).all()
+    normals = sorted(map(tuple, np.column_stack([touching["nx"], touching["ny"]]).round(12)))
+    assert normals == [(-1.0, 0.0), (0.0, -1.0)]
+
+
+def test_contact_gap_is_distance_less_radius_and_force_points_inwards():
+    (contact,) = (c for c in contacts_at(U_SHAPE, [0.01, 0.0405]) if c["wall"] < 0)
+    assert contact["gap"] == pytest.approx(0.0005 - SimulatorSettings().finger_radius)
+    assert (contact["nx"], contact["ny"]) == pytest.approx((0, -1))
+    assert (contact["x"], contact["y"]) == pytest.approx((0.01, 0.04))
+
+
+def test_far_fingers_and_high_vertices_are_left_out():
+    contacts = contacts_at(U_SHAPE, [0.5, 0.5])
+    assert (contacts["kind"] == WALL).all()
+    assert sorted(contacts["feature"]) == [0, 1]
+
+
+def test_only_the_lowest_vertices_touch_a_wall():
+    angles = 2 * np.pi * np.arange(12) / 12
+    ring = 1e-4 * np.column_stack([np.cos(angles), np.sin(angles)])  # all twelve within reach of the floor
+    contacts = contacts_at(ring, [0.5, 0.5], np.array([0, 1e-4, 0]))
+    lowest = np.argsort(ring[:, 1])[:4]
+    assert len(contacts) == 4
+    assert contacts["gap"].max() <= np.sort(ring[:, 1])[4] + 1e-4
+    assert set(lowest[:3]) <= set(contacts["feature"])
+
+
+def test_activation_is_one_in_contact_and_tends_to_the_rigid_law():
+    assert activation(-1e-3, 100.0) == activation(0.0, 100.0) == 1
+    assert activation(1e-3, 100.0) == pytest.approx(2 / (1 + np.exp(0.1)))
+    assert activation(1e-3, 1e5) < 1e-40
+    assert activation(1e-3, np.inf) < 1e-200
+    assert np.isfinite(activation(1e300, 1e300))
