@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from expert.contact.scaled import ScaledTask, ray_size
 from expert.geometry.pose import Array, cross
@@ -53,31 +54,35 @@ def plan_of(
     )
 
 
-LOOSE = 1e-4
-"""Weights above this [m g], and rho by this inside its margins, can move by a solver's tolerance."""
+REPAIR = 1e-4
+"""Largest change of a weight [m g] or of rho by which a solver's tolerance is repaired."""
 
 
 def balanced(s: ScaledTask, found: Found, margin: float) -> Found:
-    """The point with Newton-Euler restored from a solver's tolerance to the last digits: two Gauss-Newton steps.
+    """The point with Newton-Euler restored from a solver's tolerance to the last digits: a few Gauss-Newton steps on
+    the weights, which stay >= 0, and on one rho per contact interval, which stays within its margins."""
+    interval = intervals(found.modes)
+    touching = interval != FREE
+    rho = np.where(touching, np.clip(found.rho, margin, 1 - margin), 0.0)
+    rho = np.bincount(interval[touching], rho[touching]) / np.bincount(interval[touching])
+    weights = np.concatenate([found.alpha.ravel(), found.reactions])
+    allowed = np.append(np.repeat(pushing(found.modes), 2), np.full(len(found.reactions), True))
+    weights = np.where(allowed, np.maximum(weights, 0), 0)
+    for _ in range(3):
+        found = _put(found, weights, rho, interval)
+        columns = _wrench_columns(s, found) * allowed
+        jacobian = np.concatenate([columns, _torque_slopes(s, found, interval, len(rho))], axis=1)
+        low = np.append(np.maximum(-weights, -REPAIR), np.maximum(margin - rho, -REPAIR)) - 1e-15
+        high = np.append(np.full(len(weights), REPAIR), np.minimum(1 - margin - rho, REPAIR)) + 1e-15
+        change = lsq_linear(jacobian, s.required.ravel() - columns @ weights, (low, high), "bvls", 1e-16).x
+        weights, rho = np.maximum(weights + change[: len(weights)], 0), rho + change[len(weights) :]
+    return _put(found, weights, rho, interval)
 
-    The least change of positive weights, and of one rho per contact interval, that does it; what stands at a bound
-    stays there.
-    """
-    found = replace(found, alpha=np.maximum(found.alpha, 0), reactions=np.maximum(found.reactions, 0))
-    for _ in range(2):
-        columns, interval = _wrench_columns(s, found), intervals(found.modes)
-        weights = np.concatenate(
-            [np.where(pushing(found.modes)[..., None], found.alpha, 0).ravel(), found.reactions]
-        )
-        inside = np.minimum(found.rho - margin, 1 - margin - found.rho) > LOOSE
-        slopes = _torque_slopes(s, found, np.where(inside, interval, FREE), interval.max() + 1)
-        jacobian = np.concatenate([columns * (weights > LOOSE), slopes], axis=1)
-        change = np.linalg.lstsq(jacobian, s.required.ravel() - columns @ weights, rcond=None)[0]
-        weights, rho_change = weights + change[: len(weights)], np.append(change[len(weights) :], 0.0)
-        alpha, reactions = np.split(weights, [found.alpha.size])
-        rho = found.rho + np.where(inside, rho_change[interval], 0.0)
-        found = replace(found, rho=rho, alpha=alpha.reshape(found.alpha.shape), reactions=reactions)
-    return found
+
+def _put(found: Found, weights: Array, rho: Array, interval: IntArray) -> Found:
+    alpha, reactions = np.split(weights, [found.alpha.size])
+    by_step = np.append(rho, 0.0)[interval]  # FREE selects the last
+    return replace(found, rho=by_step, alpha=alpha.reshape(found.alpha.shape), reactions=reactions)
 
 
 def _wrench_columns(s: ScaledTask, found: Found) -> Array:

@@ -107,7 +107,7 @@ def _plan(
     return plan_of(
         task,
         s,
-        _found(x),
+        point_of(x),
         status=status,
         bound=result.bound * s.weight**2,
         seconds=seconds,
@@ -116,7 +116,8 @@ def _plan(
     )
 
 
-def _found(x: Variables) -> Found:
+def point_of(x: Variables) -> Found:
+    """What the variables hold, facet by facet."""
     p, rho, alpha, reactions, T = (np.asarray(v.value) for v in (x.p, x.rho, x.alpha, x.alpha_e, x.T))
     modes = modes_of(T)
     facet = np.maximum(modes, 0)[..., None, None]

@@ -1,0 +1,114 @@
+"""Two global solvers of the exact problem, written apart: branch and bound over modes, and SCIP on w = rho lambda_n."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from expert.contact import bilinear
+from expert.contact import solve as solve_exactly
+from expert.contact.recovery import Found, balanced, intervals, plan_of, pushing
+from expert.contact.scaled import ScaledTask
+from expert.contact.thesis import point_of
+from expert.contact.thesis_blocks import Variables
+from expert.errors import SolverFailed
+from expert.files import read_problem
+from expert.mip.backends import Answer
+from expert.types import FREE, ContactTask, Robustness
+from expert.verify.plan import check_plan
+from tests.expert.contact.exact_points import assign
+from tests.expert.contact.random_tasks import floor_task, table_task
+
+DATA = Path(__file__).parents[2] / "data" / "contact"
+GAP = 1e-3
+ROBUST = Robustness(
+    cone_fraction=0.7, support_inset=0.3, min_normal_force=0.03, min_interval=2, free_clearance=0.005
+)
+
+
+def assert_agreement(task: ContactTask) -> None:
+    """Same verdict, objectives within the gaps, neither bound above the other's plan, and both plans sound."""
+    exact, scip = solve_exactly(task, gap=GAP), bilinear.solve(task, gap=GAP)
+    assert exact.status == scip.status
+    if not exact.found:
+        return
+    assert exact.status == "optimal"
+    assert exact.bound <= scip.objective + 1e-6 * abs(scip.objective)
+    assert scip.bound <= exact.objective + 1e-6 * abs(exact.objective)
+    for plan in (exact, scip):
+        report = check_plan(task, plan)
+        assert report.verdict == "sound", str(report)
+
+
+@pytest.mark.parametrize(
+    "name", ["sq_slide1", "sd_slide1", "pl_curve1", "sq_pivot1", "sd_pivot1", "tri_lift2"]
+)
+def test_reference_tasks(name: str) -> None:
+    assert_agreement(read_problem(DATA / f"{name}.json").task)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_one_finger_over_a_floor(seed: int) -> None:
+    assert_agreement(floor_task(np.random.default_rng(seed), fingers=1, steps=4, robustness=ROBUST))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_two_fingers_over_a_floor(seed: int) -> None:
+    rng = np.random.default_rng(10 + seed)
+    assert_agreement(floor_task(rng, facets=3, steps=2, margin=0.2 * (seed == 0)))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_two_fingers_on_a_table(seed: int) -> None:
+    assert_agreement(table_task(np.random.default_rng(seed), facets=3, steps=2))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["tri_pivot2", "sq_pivot2"])
+def test_two_finger_primitives(name: str) -> None:
+    assert_agreement(read_problem(DATA / f"{name}.json").task)
+
+
+def test_out_of_time_is_not_infeasible() -> None:
+    plan = bilinear.solve(read_problem(DATA / "sq_lift2.json").task, time_limit=0.01)
+    assert plan.status == "time_limit"
+    assert not plan.found
+    assert plan.bound < 2.5
+
+
+def test_a_numerical_failure_is_raised_not_reported_as_infeasible(monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = Answer(status="failed", x=None, bound=-np.inf, nodes=0, message="LP trouble")
+    monkeypatch.setattr(bilinear, "scip_answer", lambda model, x: broken)
+    with pytest.raises(SolverFailed, match="LP trouble"):
+        bilinear.solve(read_problem(DATA / "sq_slide1.json").task)
+
+
+def test_nothing_is_printed(capfd: pytest.CaptureFixture[str]) -> None:
+    bilinear.solve(read_problem(DATA / "sd_slide1.json").task)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_contact_intervals_are_counted_finger_by_finger() -> None:
+    modes = np.array([[0, FREE], [0, 2], [FREE, 2], [1, FREE], [1, 2]])
+    np.testing.assert_array_equal(intervals(modes).T, [[0, 0, FREE, 1, 1], [FREE, 2, 2, FREE, 3]])
+    np.testing.assert_array_equal(pushing(modes).T, [[1, 0, 0, 1, 1], [0, 1, 0, 0, 1]])
+
+
+def test_a_wrench_off_by_a_solver_s_tolerance_is_balanced_again() -> None:
+    task = read_problem(DATA / "sq_pivot2.json").task
+    s = ScaledTask.of(task)
+    x = Variables.of(s, task.fingers.count, segments=1)
+    assign(x, task, s, solve_exactly(task))
+    found = point_of(x)
+    rng = np.random.default_rng(0)
+    noise = {
+        name: 1e-7 * rng.normal(size=getattr(found, name).shape) for name in ("rho", "alpha", "reactions")
+    }
+    noisy = replace(found, **{name: getattr(found, name) + noise[name] for name in noise})
+    assert residual(task, s, noisy) > 1e-8
+    assert residual(task, s, balanced(s, noisy, task.fingers.facet_margin)) < 1e-12
+
+
+def residual(task: ContactTask, s: ScaledTask, found: Found) -> float:
+    return plan_of(task, s, found, status="feasible", bound=0.0, seconds=0.0, nodes=0, reason="").residual
