@@ -208,9 +208,6 @@ def _external(task: ContactTask) -> tuple[Array, Array, Array]:
                 got=f"{len(here)} at step {t}",
             )
         for e, contact in enumerate(here):
-            present[t, e], points[t, e], rays[t, e] = (
-                1.0,
-                contact.point,
-                contact.rays,
-            )  # one ray fills both places
+            present[t, e], points[t, e] = 1.0, contact.point
+            rays[t, e] = contact.rays  # the one ray of a sliding contact takes both places
     return present, points, rays
