@@ -48,7 +48,7 @@ class Section:
 
     def path(self, key: str) -> str:
         """Full name of a field of this section, as errors print it."""
-        key = key if len(key) <= 60 else key[:57] + "..."
+        key = (key if len(key) <= 60 else key[:57] + "...") if key.strip() else repr(key)
         return f"{self.name}.{key}" if self.name else key
 
     def take(self, key: str, what: str) -> object:
