@@ -16,7 +16,7 @@ from expert.contact.recovery import Found, balanced, modes_of, plan_of
 from expert.contact.scaled import ScaledTask
 from expert.errors import SolverFailed
 from expert.geometry.pose import Array, cross
-from expert.mip.backends import scip_answer
+from expert.mip.backends import scip_answer, scip_limits
 from expert.types import FREE, ContactTask, Plan, Status
 
 TOLERANCE = 1e-7
@@ -47,7 +47,8 @@ def solve(task: ContactTask, *, gap: float = 1e-3, time_limit: float = 60.0) -> 
     start = time.perf_counter()
     s = ScaledTask.of(task)
     m = build(task, s)
-    m.scip.setParams({"limits/gap": gap, "limits/time": time_limit, "numerics/feastol": TOLERANCE})
+    scip_limits(m.scip, gap, time_limit)
+    m.scip.setParam("numerics/feastol", TOLERANCE)
     m.scip.optimize()
     answer = scip_answer(m.scip, [])
     if answer.status == "failed":

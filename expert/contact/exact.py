@@ -5,18 +5,21 @@ per contact interval, and a best-first search branches on modes, on rho and on f
 """
 
 import time
+from functools import cache
 
 import numpy as np
 
 from expert.contact.model import Model, model_of
 from expert.contact.plan_at import all_forces, positions_at
+from expert.contact.polish import mend
 from expert.contact.polish import polish as polished
 from expert.contact.reasons import why_infeasible
 from expert.contact.recovery import plan_cost, wrench_residual
 from expert.contact.search import NEGLIGIBLE, Outcome, Search
+from expert.contact.sequence import sequence_of
 from expert.errors import SolverFailed
 from expert.geometry.pose import Array
-from expert.types import ContactTask, Plan, Status
+from expert.types import Body, ContactTask, Environment, Fingers, HalfPlane, Plan, Status, Trajectory
 
 RESIDUAL = 1e-8
 """Largest Newton-Euler residual of a plan that is handed out, over m g and m g L."""
@@ -35,6 +38,7 @@ def solve(
     polish: finish at a stationary point of the cost at the best modes.  Raises SolverFailed where numerical failures
     leave the task undecided.
     """
+    warm_up()
     start = time.perf_counter()
     model = model_of(task)
     search = Search(model, task.fingers.count, gap)
@@ -54,6 +58,23 @@ def solve(
     if polish:
         z = polished(model, outcome.best.sequence, z).z
     return _plan(task, model, outcome, z, gap, start)
+
+
+@cache
+def warm_up() -> None:
+    """Compile or load the numerical code, once a process, so that time limits and times count solving alone."""
+    body, _ = Body.uniform([[0, 0], [1, 0], [0, 1]], 1.0)
+    task = ContactTask(
+        body=body,
+        environment=Environment(walls=(HalfPlane(point=np.zeros(2), normal=np.array([0.0, 1.0])),)),
+        trajectory=Trajectory.of([[0, 1, 0], [0, 1.1, 0], [0, 1.2, 0]], 1.0),
+        fingers=Fingers(count=1, friction=0.5, max_force=100.0),
+    )
+    model = model_of(task)
+    best = Search(model, 1, 0.1).run(node_limit=None, deadline=np.inf).best
+    if best.sequence is not None:
+        polished(model, best.sequence, best.z)
+    mend(model, sequence_of(model, np.zeros((3, 1), dtype=np.int64)), np.array([0.5]))
 
 
 def _without_plan(task: ContactTask, model: Model, search: Search, outcome: Outcome) -> tuple[Status, str]:

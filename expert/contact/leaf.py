@@ -10,10 +10,9 @@ chords for tangents.)
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from expert.contact.model import Model
-from expert.contact.qp import INFEASIBLE, SOLVED, solve_qp
+from expert.contact.qp import INFEASIBLE, SOLVED, compiled, solve_qp
 from expert.contact.sequence import (
     FLAT,
     Sequence,
@@ -66,7 +65,7 @@ class Master(NamedTuple):
     filled: IntArray
 
 
-@njit(cache=True)
+@compiled
 def pushes(sequence: Sequence, t: int) -> IntArray:
     """Intervals whose finger may push at t: those that go on, all at the last step."""
     S, C = sequence.modes.shape
@@ -79,7 +78,7 @@ def pushes(sequence: Sequence, t: int) -> IntArray:
     return out[:n]
 
 
-@njit(cache=True)
+@compiled
 def narrow(model: Model, sequence: Sequence, lo: Array, hi: Array) -> bool:
     """Tighten the box to contact positions from which every step can be balanced.  False: proved empty."""
     for _ in range(2):
@@ -99,13 +98,13 @@ def narrow(model: Model, sequence: Sequence, lo: Array, hi: Array) -> bool:
     return True
 
 
-@njit(cache=True)
+@compiled
 def support(model: Model, t: int, f: int, rho: float, y: Array, proof: bool) -> float:
     """h(rho) for a bound on the cost, or `reach` for a proof that there is no balance; both convex in rho."""
     return reach(model, t, f, rho, y) if proof else gain(model, t, f, rho, y)
 
 
-@njit(cache=True)
+@compiled
 def open_master(
     model: Model, sequence: Sequence, lo: Array, hi: Array, assigned: IntArray, rounds: int
 ) -> Master:
@@ -124,7 +123,7 @@ def open_master(
     return Master(H, g, A, b, step, np.array([side.size]))
 
 
-@njit(cache=True)
+@compiled
 def add_cut(
     model: Model,
     sequence: Sequence,
@@ -160,7 +159,7 @@ def add_cut(
     master.filled[0] += 1
 
 
-@njit(cache=True)
+@compiled
 def relax(
     model: Model,
     sequence: Sequence,
@@ -187,7 +186,7 @@ def relax(
     for _ in range(rounds):
         m = master.filled[0]
         A, b = master.A[:m], master.b[:m]
-        status, x, u = solve_qp(master.H, master.g, A, b, 0, model.iterations)
+        status, x, u = solve_qp(master.H, master.g, A, b, np.int64(0), model.iterations)
         if status == INFEASIBLE and empty(model, master, u, lo, hi, n):
             return Relaxed(np.inf, forces, best, z, last, intrusion, error)
         if status != SOLVED:
@@ -210,7 +209,7 @@ def relax(
     return Relaxed(bound, forces, best, z, last, intrusion, error)
 
 
-@njit(cache=True)
+@compiled
 def evaluate(
     model: Model, sequence: Sequence, master: Master, z: Array, lo: Array, hi: Array, error: Array
 ) -> tuple[float, float]:
@@ -239,7 +238,7 @@ def evaluate(
     return cost, missing
 
 
-@njit(cache=True)
+@compiled
 def safe_bound(
     model: Model, sequence: Sequence, master: Master, z: Array, u: Array, lo: Array, hi: Array
 ) -> float:
@@ -264,7 +263,7 @@ def safe_bound(
     return bound + least_over_box(model, z, slope, lo, hi)
 
 
-@njit(cache=True)
+@compiled
 def empty(model: Model, master: Master, u: Array, lo: Array, hi: Array, n: int) -> bool:
     """Whether multipliers prove, rounding aside, that no z in the box satisfies the rows that bound no theta."""
     row, side, size = np.zeros(n), 0.0, 0.0

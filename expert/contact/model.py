@@ -137,11 +137,11 @@ def environment_rays(
     for c in contacts:
         if c.fixed:
             continue
-        scale, limit = (weight, 1.0) if c.wall == SUPPORT else (1.0, c.limit / weight)
+        scale, most = (weight, 1.0) if c.wall == SUPPORT else (1.0, c.limit / weight)
         arm = (c.point - task.trajectory.poses[c.step, :2]) / L
         for ray in c.rays / scale:
             lists[c.step].append((wrench_about(ray, arm, np.zeros(2)), len(limits[c.step])))
-        limits[c.step].append(limit)
+        limits[c.step].append(most)
     E, G = max(map(len, lists)), max(map(len, limits))
     rays, group = np.zeros((task.steps, E, 3)), np.full((task.steps, E), -1)
     limit = np.zeros((task.steps, G))

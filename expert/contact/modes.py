@@ -10,10 +10,9 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from expert.contact.model import Model
-from expert.contact.qp import INFEASIBLE
+from expert.contact.qp import INFEASIBLE, compiled
 from expert.contact.steps import solve_step
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
@@ -82,7 +81,7 @@ def step_costs(model: Model, fingers: int) -> Array:
     return _set_costs(model, sets)[:, column[np.sort(digits, axis=1) @ place]]
 
 
-@njit(cache=True)
+@compiled
 def _set_costs(model: Model, sets: IntArray) -> Array:
     T, M = len(model.required), len(sets)
     costs = np.full((T, M), np.inf)
@@ -125,7 +124,7 @@ def last_costs(model: Model, phi: Array, moves: Moves) -> Array:
     return cost
 
 
-@njit(cache=True)
+@compiled
 def cost_to_go(phi: Array, windows: Array, moves: Moves, last: Array) -> Array:
     """V[t, s]: least force cost from t on plus smoothing cost after t, over all mode sequences from joint state s."""
     T, N, C = len(phi), moves.states.shape[0], moves.states.shape[1]

@@ -3,11 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from expert.contact.leaf import pushes
 from expert.contact.model import Model
-from expert.contact.qp import SOLVED
+from expert.contact.qp import SOLVED, compiled
 from expert.contact.sequence import Sequence, smoothing
 from expert.contact.steps import rays_per_end, solve_step
 from expert.errors import SolverFailed
@@ -27,7 +26,7 @@ class Forces(NamedTuple):
     weights: Array
 
 
-@njit(cache=True)
+@compiled
 def forces_at(model: Model, sequence: Sequence, z: Array) -> Forces:
     """Exact torque: with positions fixed, the wrench balance is linear."""
     T, C = sequence.modes.shape

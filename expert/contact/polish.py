@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from expert.contact.leaf import pushes
 from expert.contact.model import Model
 from expert.contact.plan_at import forces_at
-from expert.contact.qp import SOLVED, solve_qp
+from expert.contact.qp import SOLVED, compiled, solve_qp
 from expert.contact.sequence import Sequence, nearest_region, standing_rows
 from expert.contact.steps import RIDGE, rays_per_end, solve_step, step_program
 from expert.geometry.pose import Array
@@ -59,7 +58,8 @@ class Polished:
 def polish(model: Model, sequence: Sequence, z: Array) -> Polished:
     """Stationary point reached downhill from z."""
     forces = forces_at(model, sequence, z)
-    cost, moves = forces.cost, []
+    cost = forces.cost
+    moves: list[float] = []
     while len(moves) < ROUNDS and not _stuck(moves):
         program = first_order(model, sequence, z, forces.weights, settle_regions(model, sequence, z))
         status, v, u = solve_qp(
@@ -109,7 +109,7 @@ def mend(model: Model, sequence: Sequence, z: Array) -> tuple[Array, float]:
     return z, np.inf
 
 
-@njit(cache=True)
+@compiled
 def forces_around(model: Model, sequence: Sequence, z: Array, distance: float) -> Array:
     """Ray weights (T, N) of the least-cost forces with every rho free to move by `distance` at each step; 0: none."""
     T, C = sequence.modes.shape
@@ -146,7 +146,7 @@ def _inside(sequence: Sequence, z: Array) -> Array:
     return np.concatenate([rho, z[len(rho) :]])
 
 
-@njit(cache=True)
+@compiled
 def settle_regions(model: Model, sequence: Sequence, z: Array) -> IntArray:
     """Region with most room around each free finger, (T, C); -1 elsewhere."""
     assigned = np.full(sequence.modes.shape, -1)
@@ -158,7 +158,7 @@ def settle_regions(model: Model, sequence: Sequence, z: Array) -> IntArray:
     return assigned
 
 
-@njit(cache=True)
+@compiled
 def first_order(model: Model, sequence: Sequence, z: Array, weights: Array, assigned: IntArray) -> Program:
     """The convex program with the torque expanded to first order at z and its forces; both are held by a proximal term."""
     T, n, each = len(sequence.modes), z.size, rays_per_end(model)

@@ -14,6 +14,8 @@ from numba import njit, objmode
 from expert.geometry.pose import Array
 from expert.types import IntArray
 
+compiled = njit(cache=True, error_model="numpy")
+"""Decorator of all compiled code of the solver."""
 SOLVED, INFEASIBLE, FAILED = 0, 1, 2
 BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
@@ -21,22 +23,23 @@ FEASIBILITY = 1e-10
 """Largest violation of a constraint, in the program's own (non-dimensional) units."""
 
 
-@njit(cache=True)
+@compiled
 def solve_qp(
-    H: Array, g: Array, A: Array, b: Array, equalities: int, iterations: int
+    H: Array, g: Array, A: Array, b: Array, equalities: int | np.int64, iterations: int
 ) -> tuple[int, Array, Array]:
     """Status, minimiser x and multipliers u (u >= 0 at inequalities; Hx + g = A'u).  H must be positive definite.
 
-    INFEASIBLE comes with multipliers that prove it: A'u = 0 and b.u > 0.
+    INFEASIBLE comes with multipliers that prove it: A'u = 0 and b.u > 0.  A literal number of equalities should come as
+    np.int64, or compiled callers each get a copy of their own.
     """
-    status, x, u = goldfarb_idnani(H, g, A, b, equalities, iterations)
+    status, x, u = goldfarb_idnani(H, g, A, b, int(equalities), iterations)
     if status == FAILED:
         with objmode(status="int64", x="float64[::1]", u="float64[::1]"):
             status, x, u = fallback(H, g, A, b, equalities)
     return status, x, u
 
 
-@njit(cache=True)
+@compiled
 def goldfarb_idnani(
     H: Array, g: Array, A: Array, b: Array, equalities: int, iterations: int
 ) -> tuple[int, Array, Array]:
@@ -106,7 +109,7 @@ def goldfarb_idnani(
     return FAILED, x, u
 
 
-@njit(cache=True)
+@compiled
 def _inverse_cholesky(H: Array) -> Array:
     """L^-1 with H = L L'; entry (0, 0) is zero if H is not positive definite."""
     n = H.shape[0]
@@ -133,7 +136,7 @@ def _inverse_cholesky(H: Array) -> Array:
     return inverse
 
 
-@njit(cache=True)
+@compiled
 def _steepest_start(J: Array, g: Array, x: Array) -> None:
     """x = -H^-1 g, the minimiser without constraints."""
     n = g.size
@@ -145,7 +148,7 @@ def _steepest_start(J: Array, g: Array, x: Array) -> None:
             x[i] -= s * J[j, i]
 
 
-@njit(cache=True)
+@compiled
 def _most_violated(A: Array, b: Array, x: Array, in_use: BoolArray, equalities: int) -> tuple[int, float]:
     worst, least = -1, -FEASIBILITY
     for i in range(equalities, b.size):
@@ -158,7 +161,7 @@ def _most_violated(A: Array, b: Array, x: Array, in_use: BoolArray, equalities: 
     return worst, least
 
 
-@njit(cache=True)
+@compiled
 def _directions(
     J: Array, R: Array, row: Array, sign: float, q: int, d: Array, z: Array, r: Array
 ) -> tuple[float, float]:
@@ -184,7 +187,7 @@ def _directions(
     return full, squared
 
 
-@njit(cache=True)
+@compiled
 def _first_blocking(dual: Array, r: Array, fixed: int, q: int) -> tuple[int, float]:
     drop, t1 = -1, np.inf
     for k in range(fixed, q):
@@ -193,7 +196,7 @@ def _first_blocking(dual: Array, r: Array, fixed: int, q: int) -> tuple[int, flo
     return drop, t1
 
 
-@njit(cache=True)
+@compiled
 def _refine(
     J: Array, R: Array, A: Array, b: Array, active: IntArray, flipped: Array, x: Array, q: int
 ) -> None:
@@ -212,7 +215,7 @@ def _refine(
             x[j] += w[k] * J[k, j]
 
 
-@njit(cache=True)
+@compiled
 def _append(J: Array, R: Array, d: Array, q: int, n: int) -> None:
     """Rotate d into its first q + 1 entries and make them column q of R."""
     for j in range(n - 1, q, -1):
@@ -228,7 +231,7 @@ def _append(J: Array, R: Array, d: Array, q: int, n: int) -> None:
         R[i, q] = d[i]
 
 
-@njit(cache=True)
+@compiled
 def _remove(J: Array, R: Array, active: IntArray, dual: Array, drop: int, q: int, n: int) -> None:
     for j in range(drop + 1, q):
         active[j - 1], dual[j - 1] = active[j], dual[j]
@@ -248,11 +251,11 @@ def _remove(J: Array, R: Array, active: IntArray, dual: Array, drop: int, q: int
                 J[j + 1, i] = c * w - s * v
 
 
-def fallback(H: Array, g: Array, A: Array, b: Array, equalities: int) -> tuple[int, Array, Array]:
+def fallback(H: Array, g: Array, A: Array, b: Array, equalities: int | np.int64) -> tuple[int, Array, Array]:
     """DAQP, PIQP, Clarabel: the first that settles the program."""
     for method in (_daqp, _piqp, _clarabel):
         try:
-            status, x, u = method(H, g, A, b, equalities)
+            status, x, u = method(H, g, A, b, int(equalities))
         except Exception:
             continue  # a solver that breaks down says nothing; the next one is asked
         if status != FAILED and np.isfinite(x).all() and np.isfinite(u).all():

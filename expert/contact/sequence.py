@@ -3,10 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from expert.contact.model import Model
-from expert.contact.qp import INFEASIBLE, SOLVED, solve_qp
+from expert.contact.qp import INFEASIBLE, SOLVED, compiled, solve_qp
 from expert.geometry.pose import Array
 from expert.types import IntArray
 
@@ -37,7 +36,7 @@ class Sequence(NamedTuple):
     reference: Array
 
 
-@njit(cache=True)
+@compiled
 def sequence_of(model: Model, modes: IntArray) -> Sequence:
     """Number the variables and add up the smoothing cost (backward second differences from the third step on)."""
     S, C = modes.shape
@@ -92,7 +91,7 @@ def sequence_of(model: Model, modes: IntArray) -> Sequence:
     return Sequence(modes, interval, free, facet[:K], lo[:K], hi[:K], n, offset, map, Q, q, q0, reference)
 
 
-@njit(cache=True)
+@compiled
 def _reference(model: Model, modes: IntArray, free: IntArray, lo: Array, hi: Array, n: int) -> Array:
     """Where flat directions are held: mid-range rho; free fingers beside the middle of the nearest facet they touch."""
     z = np.zeros(n)
@@ -111,13 +110,13 @@ def _reference(model: Model, modes: IntArray, free: IntArray, lo: Array, hi: Arr
     return z
 
 
-@njit(cache=True)
+@compiled
 def smoothing(sequence: Sequence, z: Array) -> float:
     """Smoothing cost at z."""
-    return 0.5 * z @ (sequence.Q @ z) + sequence.q @ z + sequence.q0
+    return float(0.5 * z @ (sequence.Q @ z) + sequence.q @ z + sequence.q0)
 
 
-@njit(cache=True)
+@compiled
 def standing_rows(
     model: Model, sequence: Sequence, lo: Array, hi: Array, assigned: IntArray, width: int
 ) -> tuple[Array, Array]:
@@ -155,7 +154,7 @@ def standing_rows(
     return A, b
 
 
-@njit(cache=True)
+@compiled
 def least_over_box(model: Model, z: Array, slope: Array, lo: Array, hi: Array) -> float:
     """min over the box of slope.(x - z): what a convex function with this gradient at z can still fall by."""
     fall = 0.0
@@ -166,7 +165,7 @@ def least_over_box(model: Model, z: Array, slope: Array, lo: Array, hi: Array) -
     return fall
 
 
-@njit(cache=True)
+@compiled
 def least_smoothing(model: Model, modes: IntArray, assigned: IntArray) -> tuple[float, int]:
     """Lower bound of the smoothing cost of one finger's modes (S, 1) with its regions (inf: no room), and the step to
     branch on: where the finger is deepest inside the object, -1 if nowhere."""
@@ -178,7 +177,7 @@ def least_smoothing(model: Model, modes: IntArray, assigned: IntArray) -> tuple[
     A, b = standing_rows(model, s, s.lo, s.hi, assigned, s.size)
     ridge = FLAT * (1 + model.acceleration_weight)
     H = s.Q + ridge * np.eye(s.size)
-    status, z, u = solve_qp(H, s.q - ridge * s.reference, A, b, 0, model.iterations)
+    status, z, u = solve_qp(H, s.q - ridge * s.reference, A, b, np.int64(0), model.iterations)
     slope, bound = s.Q @ z + s.q, smoothing(s, z)
     if status == INFEASIBLE:
         slope[:], bound = 0.0, 0.0
@@ -200,7 +199,7 @@ def least_smoothing(model: Model, modes: IntArray, assigned: IntArray) -> tuple[
     return max(0.0, bound), t
 
 
-@njit(cache=True)
+@compiled
 def worst_intrusion(model: Model, sequence: Sequence, z: Array, assigned: IntArray) -> tuple[int, int, float]:
     """Step, finger and depth of the free finger deepest outside all regions; depth 0: all are outside the object."""
     worst_t, worst_c, worst = -1, -1, 1e-9
@@ -215,7 +214,7 @@ def worst_intrusion(model: Model, sequence: Sequence, z: Array, assigned: IntArr
     return worst_t, worst_c, worst if worst_t >= 0 else 0.0
 
 
-@njit(cache=True)
+@compiled
 def nearest_region(model: Model, t: int, x: float, y: float) -> tuple[int, float]:
     """Region that a point misses by least, and by how much (<= 0: inside)."""
     best, least = -1, np.inf

@@ -7,20 +7,21 @@ in closed form; the tolerance of the program's solver therefore never enters a b
 """
 
 import numpy as np
-from numba import njit
 
 from expert.contact.model import Model
-from expert.contact.qp import FAILED, INFEASIBLE, SOLVED, solve_qp
+from expert.contact.qp import FAILED, INFEASIBLE, SOLVED, compiled, solve_qp
 from expert.geometry.pose import Array
 from expert.types import IntArray
 
 RIDGE = 1e-9
 """Curvature given to reactions and to doubly described forces, in units of 1 / (m g)^2: reactions cost nothing."""
+CERTIFICATES, BISECTIONS = 4, 10
+"""Steps by either means towards the end of a range of rho."""
 CERTAIN = 1e-9
 """An infeasible step must miss its required wrench by this much [m g, m g L] for multipliers of length one."""
 
 
-@njit(cache=True)
+@compiled
 def seen(model: Model, t: int, f: int, rho: float, y: Array) -> tuple[float, float]:
     """Multipliers y as normal and tangential gain of a force at rho: y.wrench = z_n lambda_n + z_t lambda_t."""
     dx = model.arm[t, f, 0] + rho * model.edge[t, f, 0]
@@ -30,7 +31,7 @@ def seen(model: Model, t: int, f: int, rho: float, y: Array) -> tuple[float, flo
     return zx * n[0] + zy * n[1], zx * tau[0] + zy * tau[1]
 
 
-@njit(cache=True)
+@compiled
 def gain(model: Model, t: int, f: int, rho: float, y: Array) -> float:
     """h(rho) = max over the friction cone of y.wrench - |lambda|^2 + margin term.  Convex in rho."""
     zn, zt = seen(model, t, f, rho, y)
@@ -43,7 +44,7 @@ def gain(model: Model, t: int, f: int, rho: float, y: Array) -> float:
     return zn * normal + zt * tangential - weight * (normal * normal + tangential * tangential)
 
 
-@njit(cache=True)
+@compiled
 def reach(model: Model, t: int, f: int, rho: float, y: Array) -> float:
     """max over the friction cone of y.wrench.  Convex in rho."""
     zn, zt = seen(model, t, f, rho, y)
@@ -51,7 +52,7 @@ def reach(model: Model, t: int, f: int, rho: float, y: Array) -> float:
     return most * (model.max_force if most > 0 else model.min_force)
 
 
-@njit(cache=True)
+@compiled
 def environment_reach(model: Model, t: int, y: Array) -> float:
     """max over what walls and support can exert of y.wrench."""
     total, group, best = 0.0, -1, 0.0
@@ -70,7 +71,7 @@ def environment_reach(model: Model, t: int, y: Array) -> float:
     return total
 
 
-@njit(cache=True)
+@compiled
 def cost_bound(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, y: Array) -> float:
     """D(y): no wrench balance with these facets costs less."""
     bound = model.required[t] @ y - environment_reach(model, t, y)
@@ -80,7 +81,7 @@ def cost_bound(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, y: 
     return bound
 
 
-@njit(cache=True)
+@compiled
 def shortfall(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, y: Array) -> float:
     """Positive: no wrench balance exists with these facets, and y proves it."""
     miss = model.required[t] @ y - environment_reach(model, t, y)
@@ -89,13 +90,13 @@ def shortfall(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, y: A
     return miss
 
 
-@njit(cache=True)
+@compiled
 def rays_per_end(model: Model) -> int:
     """Rays of a finger at one rho: both edges of its cone, and the normal where the margin is rewarded."""
     return 3 if model.margin_weight > 0 else 2
 
 
-@njit(cache=True)
+@compiled
 def step_program(
     model: Model, t: int, facets: IntArray, lo: Array, hi: Array
 ) -> tuple[Array, Array, Array, Array]:
@@ -152,7 +153,7 @@ def step_program(
     return H, g, A, b
 
 
-@njit(cache=True)
+@compiled
 def solve_step(
     model: Model, t: int, facets: IntArray, lo: Array, hi: Array
 ) -> tuple[int, float, float, Array, Array]:
@@ -168,10 +169,10 @@ def solve_step(
             return SOLVED, 0.0, 0.0, y, g
         y[:] = model.required[t] / size
         return INFEASIBLE, np.inf, np.inf, y, g
-    status, x, u = solve_qp(H, g, A, b, 3, model.iterations)
+    status, x, u = solve_qp(H, g, A, b, np.int64(3), model.iterations)
     y[:] = u[:3]
     if status == SOLVED:
-        cost = 0.5 * x @ (H @ x) - 0.5 * RIDGE * (x @ x) + g @ x
+        cost = float(0.5 * x @ (H @ x) - 0.5 * RIDGE * (x @ x) + g @ x)
         trivial = cost_bound(model, t, facets, lo, hi, np.zeros(3))
         return SOLVED, cost, max(trivial, cost_bound(model, t, facets, lo, hi, y)), y, x
     if status == INFEASIBLE:
@@ -184,47 +185,69 @@ def solve_step(
     return FAILED, np.inf, cost_bound(model, t, facets, lo, hi, y), y, x
 
 
-@njit(cache=True)
+@compiled
 def tighten(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, i: int, end: int) -> bool:
-    """Move lo[i] (end 0) or hi[i] (end 1) in to the first rho that admits a wrench balance.  False: there is none.
+    """Move lo[i] (end 0) or hi[i] (end 1) in towards the first rho that admits a wrench balance.  False: there is none.
 
-    Newton's method on certificates: multipliers that prove one rho hopeless also rule out its neighbours, exactly.
+    First by certificates: multipliers that prove one rho hopeless rule out its neighbours too.  Then by bisection: the
+    rho of a convex set of (w, lambda_n) form an interval, so what lies beyond a hopeless rho is hopeless.
     """
     low, high = lo.copy(), hi.copy()
     f = facets[i]
-    for _ in range(12):
-        rho = lo[i] if end == 0 else hi[i]
-        low[i] = high[i] = rho
+    far = hi[i] if end == 0 else lo[i]
+    near = lo[i] if end == 0 else hi[i]
+    for _ in range(CERTIFICATES):
+        low[i] = high[i] = near
         status, _, _, y, _ = solve_step(model, t, facets, low, high)
         if status != INFEASIBLE:
             return True
-        others = shortfall(model, t, facets, low, high, y) + reach(model, t, f, rho, y) - CERTAIN
-        far = hi[i] if end == 0 else lo[i]
-        if reach(model, t, f, far, y) < others and reach(model, t, f, rho, y) < others:
+        others = shortfall(model, t, facets, low, high, y) + reach(model, t, f, near, y) - CERTAIN
+        if reach(model, t, f, far, y) < others:
             return False  # convex in rho: no rho in between reaches it either
-        moved = first_reach(model, t, f, rho, far, y, others)
+        near = first_reach(model, t, f, near, far, y, others)
         if end == 0:
-            lo[i] = moved
+            lo[i] = near
         else:
-            hi[i] = moved
-        if abs(moved - rho) <= 1e-12:
-            return True
+            hi[i] = near
+    possible = balanced_rho(model, t, facets, lo, hi, i)
+    if possible < 0:
+        return True
+    for _ in range(BISECTIONS):
+        low[i] = high[i] = 0.5 * (near + possible)
+        if solve_step(model, t, facets, low, high)[0] == INFEASIBLE:
+            near = low[i]
+        else:
+            possible = low[i]
+    if end == 0:
+        lo[i] = near
+    else:
+        hi[i] = near
     return True
 
 
-@njit(cache=True)
-def first_reach(model: Model, t: int, f: int, rho: float, far: float, y: Array, wanted: float) -> float:
-    """Where `reach`, convex with reach(rho) < wanted <= reach(far), attains `wanted`; never beyond that point.
+@compiled
+def balanced_rho(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, i: int) -> float:
+    """The rho of finger i in the least-cost balance over the box; -1 if that is unknown or any rho will do."""
+    status, _, _, _, x = solve_step(model, t, facets, lo, hi)
+    if status != SOLVED:
+        return -1.0
+    each, k = rays_per_end(model), 0
+    for j in range(i):
+        k += each if lo[j] == hi[j] else 2 * each
+    at_low, at_high = x[k : k + each].sum(), x[k + each : k + 2 * each].sum()
+    if lo[i] == hi[i] or at_low + at_high <= 0:
+        return -1.0
+    return (at_low * lo[i] + at_high * hi[i]) / (at_low + at_high)
 
-    The chord lies above a convex function, so each chord's root lies short of the true one.
-    """
-    start, end = rho, far
-    at_start, at_end = reach(model, t, f, start, y), reach(model, t, f, end, y)
-    for _ in range(8):
-        if at_end - at_start <= 0:
-            break
-        start += (wanted - at_start) / (at_end - at_start) * (end - start)
-        at_start = reach(model, t, f, start, y)
-        if wanted - at_start <= 1e-12:
-            break
-    return start
+
+@compiled
+def first_reach(model: Model, t: int, f: int, rho: float, far: float, y: Array, wanted: float) -> float:
+    """Where `reach`, convex with reach(rho) < wanted <= reach(far), attains `wanted`; never beyond that point."""
+    short, long = rho, far
+    for _ in range(60):
+        middle = 0.5 * (short + long)
+        if reach(model, t, f, middle, y) < wanted:
+            short = middle  # convex: nothing between rho and here reaches it
+        else:
+            long = middle
+    return short

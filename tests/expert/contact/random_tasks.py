@@ -84,9 +84,7 @@ def tilted(body: Body, poses: Array, angles: Array) -> Array:
     return np.column_stack([pivot + turned, angles])
 
 
-def table_task(
-    rng: np.random.Generator, *, facets: int = 4, steps: int = 4, fingers: int = 2
-) -> ContactTask:
+def table_task(rng: np.random.Generator, *, facets: int = 4, steps: int = 4, fingers: int = 2) -> ContactTask:
     """Slide and turn at constant velocity on a support."""
     body = random_body(rng, facets)
     velocity = np.array([*rng.uniform(-0.1, 0.1, 2), rng.uniform(-1.0, 1.0)])
