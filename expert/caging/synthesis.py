@@ -27,9 +27,11 @@ from expert.verify.cage import CageReport, verify_cage
 Method = Literal["swept", "model"]
 """swept: the model, and immobilising grasps where it is slow; model: the model alone."""
 LADDER = tuple((np.radians(a), np.radians(b)) for a, b in (
-    (15, 15), (20, 20), (30, 30), (45, 45), (10, 10), (7, 7), (5, 5),
+    (15, 15), (20, 20), (30, 30), (10, 10), (5, 5), (45, 45), (7, 7),
     (5, 25), (25, 5), (10, 40), (40, 10), (3, 3), (60, 60),
 ))  # fmt: skip
+TIGHT = np.radians(20)
+"""Restricted fingers leave less room: the ladder begins with ranges of about this width."""
 QUICK = 3
 """Ranges of the ladder that the quick part tries."""
 MOST_CUTS = 5
@@ -136,18 +138,17 @@ def _answer(tally: Tally, seconds: float) -> CageSolution:
 
 def _attempts(problem: CageProblem, method: Method) -> Iterator[Attempt | None]:
     """Quick models, grasps (None), then models of growing size and time."""
-    ranges = problem.rotation or LADDER
     plain = problem.cost == "none" and not problem.grippers and not len(problem.walls)
-    elements = problem.count + len(problem.fixed) + 2 * len(problem.walls)
-    if elements > 2:
-        for below, above in ranges[:QUICK]:
-            yield Attempt(below, above, 3, True, 0.4 if plain else 1.5)
+    ranges = problem.rotation or (LADDER if plain else sorted(LADDER, key=lambda r: abs(sum(r) - TIGHT)))
+    few = problem.count + len(problem.fixed) == 2 and not len(problem.walls)
+    if plain and not few:
+        yield from (Attempt(below, above, 3, True, 0.4) for below, above in ranges[:QUICK])
     if plain and method != "model":
         yield None
-    for seconds in (1.0, 4.0, 16.0, 64.0) if plain else (1.5, 6.0, 24.0):
-        for one_piece in (True, False) if elements > 2 else (False,):
-            for below, above in ranges:
-                yield Attempt(below, above, 99, one_piece, seconds)
+    sizes = (False,) if few or problem.grippers else (True, False)
+    slices = (1.0, 4.0, 16.0, 64.0) if plain else (3.0, 10.0, 30.0)
+    for seconds, (below, above), one_piece in itertools.product(slices, ranges, sizes):
+        yield Attempt(below, above, 99, one_piece, seconds)
 
 
 def _try_grasps(tally: Tally) -> None:
@@ -222,11 +223,11 @@ def rings(problem: CageProblem, frame: Frame) -> Iterator[list[Element]]:
     around = [Element(ends=np.stack([p, p])) for p in fixed[np.argsort(np.arctan2(*fixed.T[::-1]))]]
     for order in _orders(problem):
         free = [Element(finger=k) for k in order]
-        if len(free) + len(around) >= 2:
-            yield [*free, *around]
         for a, b in frame.relative(problem.walls):
             ends = np.stack([a, b])
             yield [*free, *around, Element(ends=ends, joined=True), Element(ends=ends)]
+        if len(free) + len(around) >= 2:
+            yield [*free, *around]
 
 
 def _labelled(problem: CageProblem) -> bool:

@@ -1,0 +1,164 @@
+"""Search for cages: what is found is verified here again, what is asked for is kept, and not found is not impossible."""
+
+import numpy as np
+import pytest
+import shapely
+
+from expert.caging.frame import Frame
+from expert.caging.immobilise import candidates
+from expert.caging.model import triangles
+from expert.caging.problem import CageProblem, Gripper, Shape
+from expert.caging.shapes import named_shape, random_nonconvex_polygon, random_polygon
+from expert.caging.swept import SweptGeometry, swept_steps
+from expert.caging.synthesis import solve
+from expert.errors import InvalidProblem
+from expert.geometry.cover import clip
+from expert.geometry.polygon import signed_distance
+from expert.geometry.pose import Array, rotation
+from expert.verify.cage import verify, verify_cage
+
+
+def problem(vertices: Array, count: int, **changes: object) -> CageProblem:
+    return CageProblem(shape=Shape(vertices=vertices), pose=np.zeros(3), count=count, **changes)  # type: ignore[arg-type]
+
+
+def geometry(vertices: Array, clearance: float = 1e-3) -> SweptGeometry:
+    shape = Shape(vertices=vertices)
+    return SweptGeometry(Frame.of(shape, np.zeros(3)).body(shape.vertices), clearance)
+
+
+@pytest.mark.parametrize("count", [3, 4, 5])
+def test_random_polygons_are_caged_and_verified(count: int) -> None:
+    for seed in range(4):
+        task = problem(random_polygon(np.random.default_rng(seed), 4 + 2 * seed), count)
+        answer = solve(task, time_limit=30)
+        assert answer.found
+        assert answer.fingers.shape == (count, 2)
+        assert verify(task, answer).verdict == "caged"
+
+
+@pytest.mark.parametrize("name", ["T", "M", "hourglass"])
+def test_the_model_alone_cages_named_shapes_with_a_loop_that_it_names(name: str) -> None:
+    task = problem(named_shape(name), 3, rotation=(tuple(np.radians([20, 20])),))
+    answer = solve(task, time_limit=60, method="model")
+    assert answer.found
+    assert answer.refuted == 0
+    assert [meeting.element for meeting in answer.topology] == [0, 1, 2]
+    assert verify(task, answer).verdict == "caged"
+
+
+def test_two_fingers_find_the_waist() -> None:
+    task = problem(named_shape("hourglass"), 2)
+    answer = solve(task, time_limit=30)
+    assert answer.found
+    assert verify(task, answer).verdict == "caged"
+
+
+def test_a_pose_anywhere_gives_fingers_there() -> None:
+    vertices, pose = named_shape("M"), np.array([0.4, -0.3, 2.0])
+    answer = solve(CageProblem(shape=Shape(vertices=vertices), pose=pose, count=3), time_limit=60)
+    assert answer.found
+    assert np.linalg.norm(answer.fingers - pose[:2], axis=1).max() < 0.2
+
+
+def test_no_two_fingers_cage_a_triangle_and_that_is_not_called_impossible() -> None:
+    triangle = np.array([[0, 0], [0.1, 0], [0.03, 0.08]])
+    answer = solve(problem(triangle, 2), time_limit=30)
+    assert answer.status == "none_found"
+    assert "others may exist" in answer.reason
+
+
+def test_a_spent_time_limit_is_reported_as_such() -> None:
+    answer = solve(problem(named_shape("hooks"), 4), time_limit=1e-9)
+    assert answer.status == "time_limit"
+    assert not answer.found
+
+
+def test_given_fingers_are_refused() -> None:
+    task = problem(named_shape("I"), 2).arrangement(np.array([[-0.02, 0], [0.02, 0]]))
+    with pytest.raises(InvalidProblem, match=r"fingers\.count"):
+        solve(task)
+
+
+@pytest.mark.slow
+def test_grippers_keep_their_openings() -> None:
+    grippers = (Gripper(fingers=(0, 1), opening=(0.0, 0.11)), Gripper(fingers=(2, 3), opening=(0.0, 0.11)))
+    task = problem(
+        named_shape("M"), 4, grippers=grippers, parallel=True, rotation=(tuple(np.radians([15, 15])),)
+    )
+    answer = solve(task, time_limit=120)
+    assert answer.found
+    for a, b in ((0, 1), (2, 3)):
+        step = answer.fingers[b] - answer.fingers[a]
+        assert step[1] == pytest.approx(0, abs=1e-6)
+        assert -1e-6 <= step[0] <= 0.11 + 1e-6
+
+
+@pytest.mark.slow
+def test_costs_order_two_finger_cages() -> None:
+    spans = {}
+    for cost in ("min_separation", "max_opening"):
+        task = problem(named_shape("hourglass"), 2, cost=cost, rotation=(tuple(np.radians([30, 30])),))
+        answer = solve(task, time_limit=60)
+        assert answer.found
+        spans[cost] = float(np.linalg.norm(answer.fingers[1] - answer.fingers[0]))
+    assert spans["min_separation"] < 0.8 * spans["max_opening"]
+
+
+def test_swept_overlaps_hold_at_every_orientation_of_the_range() -> None:
+    geo = geometry(named_shape("T"))
+    low, high = np.radians(-12), np.radians(31)
+    rng = np.random.default_rng(0)
+    for (i, j), (A, b) in geo.overlaps(low, high).items():
+        K = clip(9 * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]]), A, b)
+        for _ in range(20):
+            gap = rng.dirichlet(np.ones(len(K))) @ K
+            for angle in np.linspace(low, high, 60):
+                first = shapely.Polygon(-geo.pieces[i] @ rotation(angle).T + gap)
+                second = shapely.Polygon(-geo.pieces[j] @ rotation(angle).T)
+                assert first.intersects(second)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_regions_avoid_the_object_and_directions_separate(seed: int) -> None:
+    geo = geometry(random_nonconvex_polygon(np.random.default_rng(seed), 5 + seed))
+    square = 3 * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+    rng = np.random.default_rng(seed)
+    for r, region in enumerate(geo.regions):
+        corners = clip(square, region.A, region.b)
+        points = rng.dirichlet(np.ones(len(corners)), 30) @ corners
+        assert (signed_distance(geo.vertices, points) > 0).all()
+        for i, piece in enumerate(geo.pieces):
+            u = np.array([np.cos(geo.directions[r, i]), np.sin(geo.directions[r, i])])
+            assert ((points[:, None] - piece[None]) @ u).min() > -1e-9
+    i, j = np.nonzero(geo.meeting)
+    assert (np.abs(geo.directions[:, i] - geo.directions[:, j]) < np.pi + 1e-9).all()
+
+
+def test_steps_partition_a_range() -> None:
+    steps = swept_steps(-0.3, 0.5)
+    edges = [m - h for m, h in steps] + [steps[-1][0] + steps[-1][1]]
+    assert edges[0] == pytest.approx(-0.3)
+    assert edges[-1] == pytest.approx(0.5)
+    assert max(np.diff(edges)) <= np.radians(2.5) + 1e-12
+
+
+@pytest.mark.parametrize(("count", "hub"), [(3, 0), (4, 1), (6, 2)])
+def test_fans_share_edges_with_the_loop(count: int, hub: int) -> None:
+    corners = [[c for c, _ in triangle] for triangle in triangles(count, hub)]
+    assert len(corners) == count - 2
+    edges = {frozenset((a, b)) for t in corners for a in t for b in t if a != b}
+    assert all(frozenset((k, (k + 1) % count)) in edges for k in range(count))
+
+
+def test_immobilising_grasps_are_outside_and_mostly_cage() -> None:
+    caged = 0
+    for seed in range(10):
+        shape = Shape(vertices=random_polygon(np.random.default_rng(seed), 7))
+        for fingers in candidates(shape.vertices, 3, shape.size, np.random.default_rng(0)):
+            assert (signed_distance(shape.vertices, fingers) > 0).all()
+            arrangement = problem(shape.vertices, 3).arrangement(fingers)
+            if verify_cage(arrangement).verdict == "caged":
+                caged += 1
+                break
+    assert caged >= 8
