@@ -62,7 +62,7 @@ def scip(form: StandardForm, gap: float, time_limit: float) -> Answer:
     model.setSeparating(
         pyscipopt.SCIP_PARAMSETTING.FAST
     )  # thorough rounding cuts cost most of the time and gain little
-    model.setParams({"limits/gap": gap, "limits/time": time_limit, "parallel/maxnthreads": 1})
+    scip_limits(model, gap, time_limit)
     x = [
         model.addVar(vtype="I" if i else "C", lb=_finite(a), ub=_finite(b))
         for i, a, b in zip(form.integral, form.low, form.high, strict=True)
@@ -78,6 +78,11 @@ def scip(form: StandardForm, gap: float, time_limit: float) -> Answer:
     )
     model.optimize()
     return scip_answer(model, x)
+
+
+def scip_limits(model: pyscipopt.Model, gap: float, time_limit: float) -> None:
+    """Stop at this gap or after this much processor time [s]: what is found must not depend on the machine's load."""
+    model.setParams({"limits/gap": gap, "limits/time": time_limit, "timing/clocktype": 1})
 
 
 def scip_answer(model: pyscipopt.Model, x: list) -> Answer:

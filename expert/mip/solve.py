@@ -50,7 +50,8 @@ def solve(
 ) -> Result:
     """Minimise; the incumbent, if any, is left in the problem's variables.  Never prints.
 
-    scip: linear or convex quadratic.  highs: linear.  gurobi: both, with a licence.  time_limit [s] excludes compilation.
+    scip: linear or convex quadratic.  highs: linear.  gurobi: both, with a licence.  time_limit [s] excludes compilation, and
+    is processor time for scip.
     Raises KeyboardInterrupt when interrupted, InvalidProblem for a solver that is missing or does not fit.
     """
     start = time.perf_counter()

@@ -73,6 +73,17 @@ def test_more_segments_tighten_the_relaxation() -> None:
     assert bounds[2] == pytest.approx(exact.objective, rel=0.05)
 
 
+@pytest.mark.slow
+def test_coarse_envelopes_make_the_impossible_look_feasible() -> None:
+    """Thesis Fig. 3-6e: one finger cannot pivot the tool at friction 0.1; envelopes of one segment say that it can."""
+    task = reference("sd_pivot1")
+    assert solve_exactly(task).status == "infeasible"
+    coarse = thesis.solve(task, segments=1)
+    assert coarse.found
+    assert coarse.residual > 0.1
+    assert check_plan(task, coarse).verdict == "refuted"
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_small_random_tasks_are_bounded_from_below(seed: int) -> None:
     rng = np.random.default_rng(seed)
