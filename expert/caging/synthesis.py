@@ -21,7 +21,7 @@ from expert.caging.solution import CageSolution, Meeting
 from expert.caging.swept import SweptGeometry
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, to_world
-from expert.mip.backends import Answer, Solver
+from expert.mip.backends import Solver
 from expert.verify.cage import CageReport, verify_cage
 
 Method = Literal["swept", "model"]
@@ -202,15 +202,14 @@ def _search(tally: Tally, model: SweptModel, frame: Frame, seconds: float, solve
         )
         report = tally.judge(fingers)
         if report is not None and report.verdict == "caged":
-            tally.keep(fingers, report, _topology(model, answer))
+            tally.keep(fingers, report, _topology(model, answer.x))
             return
         model.cut(answer.x)
 
 
-def _topology(model: SweptModel, answer: Answer) -> tuple[Meeting, ...]:
-    assert answer.x is not None
+def _topology(model: SweptModel, x: Array) -> tuple[Meeting, ...]:
     keys, count = list(model.overlaps), len(model.ring)
-    chosen = answer.x[model.H].argmax(axis=1)
+    chosen = x[model.H].argmax(axis=1)
     return tuple(
         Meeting(element=n, piece=keys[k][0], next_element=(n + 1) % count, next_piece=keys[k][1])
         for n, k in enumerate(chosen)

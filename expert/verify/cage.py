@@ -10,7 +10,7 @@ overlays on a grid, which are robust, and where the two disagree the whole searc
 
 import time
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -28,14 +28,16 @@ class CageReport:
     rotation_range: orientations [rad] that the object can reach at most (caged); (-inf, inf) where it may turn for good.
     path: body poses (K, 3) of an escape; neighbours differ by a translation or by a rotation about a fixed point.
     resolution: half-width [rad] of the smallest cell.  cells: how many were computed.
+    reason: why an answer was refuted before its cage was looked at: its grippers cannot do it.
     """
 
-    verdict: Verdict
+    verdict: Verdict | Literal["refuted"]
     cells: int
     resolution: float
     seconds: float
     rotation_range: tuple[float, float] | None = None
     path: Array = field(default_factory=lambda: np.empty((0, 3)))
+    reason: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON values; an unlimited rotation_range is null."""
@@ -48,16 +50,18 @@ class CageReport:
             "resolution": self.resolution,
             "seconds": self.seconds,
             "path": self.path.tolist(),
+            "reason": self.reason,
         }
 
     def __str__(self) -> str:
         cells = f"{self.cells} cells, half-width down to {np.degrees(self.resolution):.3g} deg"
         if self.verdict == "escapes":
             return f"escapes: a collision-free path of {len(self.path)} poses, checked exactly ({cells})"
+        if self.verdict == "refuted":
+            return f"refuted: {self.reason}"
         if self.verdict == "unknown":
             return f"unknown: inner and outer approximations still disagree ({cells})"
-        assert self.rotation_range is not None
-        low, high = np.degrees(self.rotation_range)
+        low, high = np.degrees(self.rotation_range or (-np.inf, np.inf))
         turn = f"orientations within [{low:.4g}, {high:.4g}] deg" if np.isfinite(low) else "any orientation"
         return f"caged: {turn} ({cells})"
 
@@ -108,4 +112,20 @@ def verify(task: Arrangement | CageProblem, answer: CageSolution | None = None) 
         raise InvalidProblem(
             "status", expected="caged", got=answer.status, remedy="there is no claim to check"
         )
+    if fault := gripper_fault(task, answer.fingers):
+        return CageReport(verdict="refuted", cells=0, resolution=np.pi, seconds=0.0, reason=fault)
     return verify_cage(task.arrangement(answer.fingers))
+
+
+def gripper_fault(task: CageProblem, fingers: Array) -> str:
+    """Which gripper cannot hold its fingers (count, 2) there; empty if all can."""
+    tolerance = 1e-6 * task.shape.size
+    for k, gripper in enumerate(task.grippers):
+        i, j = gripper.fingers
+        step = fingers[j] - fingers[i]
+        if task.parallel and (abs(step[1]) > tolerance or step[0] < -tolerance):
+            return f"gripper {k} is not parallel to the x axis"
+        least, most = gripper.opening
+        if not least - tolerance <= np.linalg.norm(step) <= most + tolerance:
+            return f"gripper {k} opens by {np.linalg.norm(step):.4g} m, outside [{least:g}, {most:g}]"
+    return ""

@@ -9,6 +9,7 @@ from expert.caging.immobilise import candidates
 from expert.caging.model import triangles
 from expert.caging.problem import CageProblem, Gripper, Shape
 from expert.caging.shapes import named_shape, random_nonconvex_polygon, random_polygon
+from expert.caging.solution import CageSolution
 from expert.caging.swept import SweptGeometry, swept_steps
 from expert.caging.synthesis import solve
 from expert.errors import InvalidProblem
@@ -162,3 +163,11 @@ def test_immobilising_grasps_are_outside_and_mostly_cage() -> None:
                 caged += 1
                 break
     assert caged >= 8
+
+
+def test_an_answer_that_its_grippers_cannot_hold_is_refuted() -> None:
+    task = problem(named_shape("I"), 2, grippers=(Gripper(fingers=(0, 1), opening=(0.0, 0.03)),))
+    answer = CageSolution(status="caged", fingers=np.array([[-0.02, 0.0], [0.02, 0.0]]))
+    report = verify(task, answer)
+    assert report.verdict == "refuted"
+    assert "gripper 0 opens by 0.04 m" in str(report)
