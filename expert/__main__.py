@@ -7,8 +7,11 @@ Exit codes: 0 solved, sound or drawn; 1 refuted (or a solver that failed); 2 bad
 import argparse
 import contextlib
 import json
+import os
 import sys
-from collections.abc import Iterator, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -30,19 +33,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         code: int = options.command(options)
     except InvalidProblem as error:
-        print(f"error: {_named(options)}{error}", file=sys.stderr)
+        print(f"error: {options.file}: {error}", file=sys.stderr)
         return BAD_INPUT
     except ExpertError as error:
         print(f"error: {error}", file=sys.stderr)
         return REFUTED
     except KeyboardInterrupt:
-        print("interrupted: nothing was written; run the same command to start again", file=sys.stderr)
-        return INTERRUPTED
+        print(
+            "interrupted: nothing was written; run the same command to start again",
+            file=sys.stderr,
+            flush=True,
+        )
+        # A computation may still run in its thread, in compiled code that cannot be stopped otherwise.
+        os._exit(INTERRUPTED)
     return code
-
-
-def _named(options: argparse.Namespace) -> str:
-    return f"{options.file}: "
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -80,7 +84,7 @@ def _solve(options: argparse.Namespace) -> int:
         problem = problem_of({**problem.data, "options": chosen})
     solve = problem.entry.function("solve")
     with _progress(f"solving {options.file.name}"):
-        answer = solve(problem.task, **problem.options)
+        answer = _interruptible(lambda: solve(problem.task, **problem.options))
     if options.output:
         write_solution(options.output, problem, answer)
     _report_solution(options, answer)
@@ -122,7 +126,7 @@ def _verify(options: argparse.Namespace) -> int:
         problem, answer = problem_of(data), None
     verify = problem.entry.function("verify")
     with _progress(f"checking {options.file.name}"):
-        report = verify(problem.task, answer)
+        report = _interruptible(lambda: verify(problem.task, answer))
     if options.output:
         save(options.output, report.as_dict())
     print(report)
@@ -142,6 +146,23 @@ def _draw(options: argparse.Namespace) -> int:
         draw(solution.problem.task, solution.answer, options.output)
     print(f"picture in {options.output}")
     return SOLVED
+
+
+def _interruptible(work: Callable[[], Any]) -> Any:
+    """The result of work done in a thread of its own, so that Ctrl-C arrives here.
+
+    In the thread that it interrupts, compiled code may return with an exception half set and crash the interpreter.
+    """
+    outcome: Future[Any] = Future()
+
+    def run() -> None:
+        try:
+            outcome.set_result(work())
+        except BaseException as error:
+            outcome.set_exception(error)
+
+    threading.Thread(target=run, daemon=True).start()
+    return outcome.result()
 
 
 @contextlib.contextmanager
