@@ -252,7 +252,7 @@ def _remove(J: Array, R: Array, active: IntArray, dual: Array, drop: int, q: int
 
 
 def fallback(H: Array, g: Array, A: Array, b: Array, equalities: int | np.int64) -> tuple[int, Array, Array]:
-    """DAQP, PIQP, Clarabel: the first that settles the program."""
+    """DAQP, PIQP, Clarabel: the first that solves the program, or proves that nothing does."""
     for method in (_daqp, _piqp, _clarabel):
         try:
             status, x, u = method(H, g, A, b, int(equalities))
@@ -267,9 +267,8 @@ def _daqp(H: Array, g: Array, A: Array, b: Array, equalities: int) -> tuple[int,
     upper = np.where(np.arange(b.size) < equalities, b, 1e30)
     sense = np.where(np.arange(b.size) < equalities, 5, 0).astype(np.int32)
     x, _, flag, info = daqp.solve(H, g, A, upper, b.copy(), sense, primal_tol=FEASIBILITY)
-    # DAQP flags -1 alone as infeasible; its other failures say nothing about feasibility.
-    status = SOLVED if flag == 1 else INFEASIBLE if flag == -1 else FAILED
-    return status, np.asarray(x), -np.asarray(info["lam"])
+    # Flag -1 means infeasible, but comes without a proof, and was seen on programs that others solve.
+    return SOLVED if flag == 1 else FAILED, np.asarray(x), -np.asarray(info["lam"])
 
 
 def _piqp(H: Array, g: Array, A: Array, b: Array, equalities: int) -> tuple[int, Array, Array]:
@@ -292,6 +291,6 @@ def _clarabel(H: Array, g: Array, A: Array, b: Array, equalities: int) -> tuple[
     answer = clarabel.DefaultSolver(
         sparse(np.triu(H)), g, sparse(-A), -np.asarray(b), cones, settings
     ).solve()
-    if answer.status != clarabel.SolverStatus.Solved:
-        return FAILED, g, b
-    return SOLVED, np.array(answer.x), np.array(answer.z)
+    claims = {clarabel.SolverStatus.Solved: SOLVED, clarabel.SolverStatus.PrimalInfeasible: INFEASIBLE}
+    status = claims.get(answer.status, FAILED)
+    return status, g if status == INFEASIBLE else np.array(answer.x), np.array(answer.z)

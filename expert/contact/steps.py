@@ -210,8 +210,8 @@ def tighten(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, i: int
         else:
             hi[i] = near
     possible = balanced_rho(model, t, facets, lo, hi, i)
-    if possible < 0:
-        return True
+    if possible < 0 or possible == np.inf:
+        return possible < 0
     for _ in range(BISECTIONS):
         low[i] = high[i] = 0.5 * (near + possible)
         if solve_step(model, t, facets, low, high)[0] == INFEASIBLE:
@@ -227,10 +227,10 @@ def tighten(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, i: int
 
 @compiled
 def balanced_rho(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, i: int) -> float:
-    """The rho of finger i in the least-cost balance over the box; -1 if that is unknown or any rho will do."""
+    """The rho of finger i in the least-cost balance over the box; -1: unknown, or any rho will do; inf: none exists."""
     status, _, _, _, x = solve_step(model, t, facets, lo, hi)
     if status != SOLVED:
-        return -1.0
+        return np.inf if status == INFEASIBLE else -1.0
     each, k = rays_per_end(model), 0
     for j in range(i):
         k += each if lo[j] == hi[j] else 2 * each

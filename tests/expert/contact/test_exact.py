@@ -206,7 +206,7 @@ def test_without_the_fast_solver_the_fallbacks_find_the_same_optimum(monkeypatch
     reference = solve(task)
     warm_up()
     monkeypatch.setattr(exact, "model_of", with_fast_path_failing)
-    plan = solve(task, node_limit=60)
+    plan = solve(task, node_limit=300)
     assert plan.found
     assert plan.objective == pytest.approx(reference.objective, rel=2e-3)
     assert check_plan(task, plan).verdict == "sound"

@@ -105,8 +105,8 @@ def test_a_polished_plan_is_the_optimum_of_its_own_convex_program(seed: int) -> 
         pytest.skip("no plan to polish")
     positions, forces = first_order_minimiser(task, plan)
     touching = plan.modes != FREE
-    assert np.abs(positions - plan.positions)[touching].max(initial=0.0) < 1e-5
-    assert np.abs(forces - plan.forces).max() < 1e-5
+    assert np.abs(positions - plan.positions)[touching].max(initial=0.0) < 5e-6  # flat: 1e-6 of curvature
+    assert np.abs(forces - plan.forces).max() < 1e-6
 
 
 def test_polishing_never_raises_the_cost_and_keeps_the_modes() -> None:
