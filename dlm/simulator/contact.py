@@ -142,7 +142,7 @@ def _acts(gap: float, approach: float, kappa: float) -> bool:
     return activation(gap, kappa) > LEAST_ACTIVATION
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _add_finger(
     scene: View,
     physics: Physics,
@@ -184,7 +184,7 @@ def _add_finger(
     return n + 1
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _add_wall(
     scene: View,
     physics: Physics,

@@ -204,24 +204,28 @@ def command(
 
     Infinite stiffness leaves the forces out: where the fingers themselves are planned to be.
     """
+    T, C = positions.shape[:2]
+    local = np.empty((2, T, C, 2))
+    for t in range(T):
+        at = table.knot_frame[t]
+        cs, sn = np.cos(at[2]), np.sin(at[2])
+        for c in range(C):
+            for k, x, y in (
+                (0, positions[t, c, 0] - at[0], positions[t, c, 1] - at[1]),
+                (1, forces[t, c, 0] / stiffness, forces[t, c, 1] / stiffness),
+            ):
+                local[k, t, c, 0], local[k, t, c, 1] = cs * x + sn * y, cs * y - sn * x
     for i in range(len(out)):
         frame = table.frame[i]
         cs, sn = np.cos(frame[2]), np.sin(frame[2])
-        for c in range(out.shape[1]):
-            bx, by = table.offset[i, c, 0], table.offset[i, c, 1]
+        for c in range(C):
+            x, y = table.offset[i, c, 0], table.offset[i, c, 1]
             for side in range(2):
                 t, w, f = table.knot[i, c, side], table.weight[i, c, side], table.force_weight[i, c, side]
-                at = table.knot_frame[t]
-                ca, sa = np.cos(at[2]), np.sin(at[2])
-                x = w * (positions[t, c, 0] - at[0])
-                y = w * (positions[t, c, 1] - at[1])
-                if f != 0:
-                    x += f * forces[t, c, 0] / stiffness
-                    y += f * forces[t, c, 1] / stiffness
-                bx += ca * x + sa * y
-                by += ca * y - sa * x
-            out[i, c, 0] = frame[0] + cs * bx - sn * by
-            out[i, c, 1] = frame[1] + sn * bx + cs * by
+                x += w * local[0, t, c, 0] + f * local[1, t, c, 0]
+                y += w * local[0, t, c, 1] + f * local[1, t, c, 1]
+            out[i, c, 0] = frame[0] + cs * x - sn * y
+            out[i, c, 1] = frame[1] + sn * x + cs * y
 
 
 @njit(cache=True)
