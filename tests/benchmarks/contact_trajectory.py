@@ -126,7 +126,7 @@ def random_runs(count: int, facets: tuple[int, int]) -> dict[str, list[Run]]:
     """The exact solver on random tasks, by name of the group."""
     groups = {}
     for robust in (True, False):
-        name = f"{facets[0]}-{facets[1]} facets, {'with' if robust else 'no'} margins"
+        name = f"{facets[0]} to {facets[1]} facets, {'with' if robust else 'no'} margins"
         tasks = random_tasks(count, facets, robust=robust, seed=facets[0])
         groups[name] = [run(f"{name} {i}", task) for i, task in watched(enumerate(tasks), count, name)]
     return groups
