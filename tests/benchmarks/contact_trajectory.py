@@ -126,7 +126,7 @@ def random_runs(count: int, facets: tuple[int, int]) -> dict[str, list[Run]]:
     """The exact solver on random tasks, by name of the group."""
     groups = {}
     for robust in (True, False):
-        name = f"{facets[0]} to {facets[1]} facets, {'with' if robust else 'no'} margins"
+        name = f"{'-'.join(map(str, sorted(set(facets))))} facets, {'with' if robust else 'no'} margins"
         tasks = random_tasks(count, facets, robust=robust, seed=facets[0])
         groups[name] = [run(f"{name} {i}", task) for i, task in watched(enumerate(tasks), count, name)]
     return groups
@@ -270,7 +270,7 @@ def verdict(r: Run) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
-        "--quick", action="store_true", help="fewer tasks, short limits, SCIP on primitives alone"
+        "--quick", action="store_true", help="fewer pairs, short limits for SCIP, MIQP1 on primitives alone"
     )
     parser.add_argument(
         "--tasks", type=int, help="random tasks with 4 to 6 facets per group (200; quick: 40)"
@@ -282,7 +282,7 @@ def main() -> int:
     quick = options.quick
     limit = options.limit or (4.0 if quick else 60.0)
     warm_up()
-    count = options.tasks or (40 if quick else 200)
+    count = options.tasks
     few, twelve = random_runs(count, (4, 6)), random_runs(max(count // 4, 1), (12, 12))
     gallery = gallery_runs(("exact",) if quick else ("exact", "thesis", "scip"), limit)
     if quick:
