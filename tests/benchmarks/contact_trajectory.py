@@ -272,9 +272,7 @@ def main() -> int:
     parser.add_argument(
         "--quick", action="store_true", help="fewer pairs, short limits for SCIP, MIQP1 on primitives alone"
     )
-    parser.add_argument(
-        "--tasks", type=int, help="random tasks with 4 to 6 facets per group (200; quick: 40)"
-    )
+    parser.add_argument("--tasks", type=int, default=200, help="random tasks with 4 to 6 facets per group")
     parser.add_argument("--pairs", type=int, help="small tasks given to both exact methods (90; quick: 8)")
     parser.add_argument("--limit", type=float, help="seconds for each program in SCIP (60; quick: 4)")
     parser.add_argument("--json", type=Path)
@@ -301,7 +299,7 @@ def report(
     bars: Bars,
 ) -> None:
     """Tables on stdout, everything in JSON."""
-    console = Console()
+    console = Console(width=max(Console().width, 140))
     console.print(random_table(groups), gallery_table(gallery))
     table = Table("bar", "measured", "wanted", "")
     for what, measured, wanted, ok in bars.rows:
