@@ -415,13 +415,13 @@ def descend(annealed: bool, steps: int = 60) -> tuple[float, float, float]:
         return object_trajectory_loss(rollout(batch, p, forces, settings, contact=flags), goal).sum()
 
     optimiser = torch.optim.Adam([p], lr=2e-3)
-    before, first = float(loss(np.inf)), 0.0
+    before, first = loss(np.inf).item(), 0.0
     for k in range(steps):
         optimiser.zero_grad()
         loss(100 * 25 ** (k / (steps - 1)) if annealed else np.inf).backward()
-        first = float(p.grad.norm()) if k == 0 else first
+        first = p.grad.norm().item() if k == 0 else first
         optimiser.step()
-    return before, float(loss(np.inf)), first
+    return before, loss(np.inf).item(), first
 
 
 SECTIONS: dict[str, Callable[[Material, Report], None]] = {
