@@ -165,8 +165,8 @@ def region_rows(task: ContactTask) -> Array:
     rows = np.tile(np.array([0.0, 0.0, 1.0]), (task.steps, len(regions), most, 1))
     turn = rotation(task.trajectory.poses[:, 2])
     for k, region in enumerate(regions):
-        normals = np.einsum("tij,hj->thi", turn, region.A)
-        shift = np.einsum("thi,ti->th", normals, task.trajectory.poses[:, :2])
+        normals = np.einsum("tde,he->thd", turn, region.A)
+        shift = np.einsum("thd,td->th", normals, task.trajectory.poses[:, :2])
         rows[:, k, : len(region.b), :2] = normals
         rows[:, k, : len(region.b), 2] = region.b + shift
     return rows
