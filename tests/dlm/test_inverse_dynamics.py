@@ -9,6 +9,7 @@ from dlm.inverse_dynamics import Action, InverseDynamics
 from dlm.parameters import FLAGS, Layout, ParameterBatch
 from dlm.qp_data import QPSize, QPWeights
 from dlm.qp_problem import inverse_dynamics_problem
+from dlm.tasks import TaskBatch
 from expert.errors import InvalidProblem
 from expert.types import Cost
 from tests.datasets.labelled import labels
@@ -72,6 +73,17 @@ def test_at_the_truth_the_optimum_is_the_expert_s_plan(
     assert action.solved.all()
     assert misses(action, everyone, truth).max() < WITHIN
     assert action.slack.abs().max() < 1e-5
+
+
+def test_stored_tasks_keep_the_equality(tasks: TaskBatch) -> None:
+    with torch.no_grad():
+        action = InverseDynamics(backend="batched", slack=None)(tasks.parameters)
+    touching = tasks.parameters.contact[..., None]
+    position = (action.positions - tasks.positions).abs() * touching / tasks.size[:, None, None, None]
+    force = (action.forces - tasks.forces).abs() / tasks.weight[:, None, None, None]
+    assert action.solved.all()
+    assert position.max() < WITHIN
+    assert force.max() < WITHIN
 
 
 def test_without_its_ingredients_p_misses_the_plan(everyone: list, truth: ParameterBatch) -> None:
