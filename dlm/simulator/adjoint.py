@@ -35,7 +35,7 @@ TOUCHING = 1e-12
 """Plans start with fingers that touch: there smoothed contacts have a kink, and the mean of both slopes is taken [m]."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def softness_slope(gap: float, physics: Physics) -> float:
     """Derivative of `softness` with respect to the gap: (1 - a) / a = (exp(kappa gap) - 1) / 2 where the gap is open."""
     if np.isinf(physics.kappa) or gap < -TOUCHING or physics.kappa * gap > 500:
@@ -44,7 +44,7 @@ def softness_slope(gap: float, physics: Physics) -> float:
     return slope if gap > TOUCHING else slope / 2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def bias_slope(gap: float, h: float, physics: Physics) -> float:
     """Derivative of `bias` with respect to the gap."""
     if gap < -SHALLOW:
@@ -54,7 +54,7 @@ def bias_slope(gap: float, h: float, physics: Physics) -> float:
     return 0.0 if gap > TOUCHING else 0.5 / h
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def row_multipliers(n: int, work: Work, impulse_adjoint: np.ndarray, w: np.ndarray) -> None:
     """Solve B^T w = adjoint of the impulses, for the equations of the active set; w is 0 on all other rows."""
     contacts, rows = work.contacts, work.rows
@@ -83,7 +83,7 @@ def row_multipliers(n: int, work: Work, impulse_adjoint: np.ndarray, w: np.ndarr
                 row += 1
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def adjoint_step(
     scene: View,
     physics: Physics,
@@ -137,7 +137,7 @@ def adjoint_step(
             p_bar[c, d] -= follow * ends[c, d]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _adjoint_contact(
     i: int,
     scene: View,
@@ -191,7 +191,7 @@ def _adjoint_contact(
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _adjoint_geometry(
     contact: np.record,
     facet: np.record,
@@ -233,7 +233,7 @@ def _adjoint_geometry(
     _to_pose(cx_bar - gx, cy_bar - gy, rx, ry, q_bar)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _to_pose(gx: float, gy: float, rx: float, ry: float, q_bar: np.ndarray) -> None:
     """Adjoint of a body point at arm (rx, ry)."""
     q_bar[0] += gx
@@ -241,7 +241,7 @@ def _to_pose(gx: float, gy: float, rx: float, ry: float, q_bar: np.ndarray) -> N
     q_bar[2] += gy * rx - gx * ry
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _adjoint_support(scene: View, physics: Physics, q: np.ndarray, z: np.ndarray, v: np.ndarray) -> float:
     """Derivative of the support friction's impulse along z with respect to the object's angle."""
     h = scene.dt / physics.substeps
@@ -259,7 +259,7 @@ def _adjoint_support(scene: View, physics: Physics, q: np.ndarray, z: np.ndarray
     return total
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, error_model="numpy", nogil=True)
 def implicit_batch(
     scenes: SceneArrays,
     physics: Physics,
@@ -301,7 +301,7 @@ def implicit_batch(
     return d_positions, d_forces
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, error_model="numpy", nogil=True)
 def difference_batch(
     scenes: SceneArrays,
     physics: Physics,
@@ -361,20 +361,20 @@ def difference_batch(
     return d_positions, d_forces
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def acts_alike(table: Commands, t: int, c: int) -> bool:
     """Whether force and position of finger c at knot t move the commands alike, and the start not at all."""
     for i in range(len(table.knot)):
+        place, push = 0.0, 0.0
         for side in range(2):
-            if table.knot[i, c, side] == t:
-                if table.weight[i, c, side] != table.force_weight[i, c, side]:
-                    return False
-                if i == 0 and table.weight[i, c, side] != 0:
-                    return False
+            place += table.weight[i, c, side] * (table.knot[i, c, side] == t)
+            push += table.force_weight[i, c, side] * (table.force_knot[i, c, side] == t)
+        if place != push or (i == 0 and place != 0):
+            return False
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _restart(
     table: Commands,
     plan: np.ndarray,

@@ -38,7 +38,7 @@ class View(NamedTuple):
     dt: float
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def view(scenes: SceneArrays, b: int) -> View:
     """Scene b of a batch."""
     return View(
@@ -54,7 +54,7 @@ def view(scenes: SceneArrays, b: int) -> View:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def activation(gap: float, kappa: float) -> float:
     """min(1, 2 sigmoid(-kappa gap)), the smoothed contact indicator (Thesis 4-CT9); 0 or 1 for kappa = inf."""
     if gap <= 0:
@@ -62,7 +62,7 @@ def activation(gap: float, kappa: float) -> float:
     return 2 / (1 + np.exp(min(kappa * gap, 500.0)))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def nearest(facets: np.ndarray, x: float, y: float) -> tuple[int, int, float]:
     """Feature of the boundary nearest to a body point: kind, index, signed distance (negative inside)."""
     n = len(facets)
@@ -88,7 +88,7 @@ def nearest(facets: np.ndarray, x: float, y: float) -> tuple[int, int, float]:
     return kind, index, side * np.sqrt(best)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def collect(
     scene: View,
     physics: Physics,
@@ -119,7 +119,7 @@ def collect(
     return n
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _second_facet(facets: np.ndarray, index: int, x: float, y: float) -> int:
     """Facet beyond a reflex end of facet `index` that a point faces too; -1 if there is none."""
     count = len(facets)
@@ -134,7 +134,7 @@ def _second_facet(facets: np.ndarray, index: int, x: float, y: float) -> int:
     return -1
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _acts(gap: float, approach: float, kappa: float) -> bool:
     """Whether a contact can matter that closes by `approach` during the step."""
     if np.isinf(kappa):
@@ -142,7 +142,7 @@ def _acts(gap: float, approach: float, kappa: float) -> bool:
     return activation(gap, kappa) > LEAST_ACTIVATION
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _add_finger(
     scene: View,
     physics: Physics,
@@ -184,7 +184,7 @@ def _add_finger(
     return n + 1
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _add_wall(
     scene: View,
     physics: Physics,

@@ -19,7 +19,7 @@ from dlm.simulator.settings import Layers
 
 
 class Commands(NamedTuple):
-    """Tables of one scene, S + 1 substeps, C fingers: knots (S+1, C, 2), weights and force weights alike, offset, frames.
+    """Tables of one scene, S + 1 substeps, C fingers: knots and weights of positions and of forces, each (S+1, C, 2).
 
     frame (S+1, 3) and knot_frame (T, 3) are poses; offset (S+1, C, 2) is in the frame of the substep.  It moves with the
     plan too: stand-off (T, C) along normal (T, C, 2) at the knots, with `slope` its derivative along the normal and
@@ -28,6 +28,7 @@ class Commands(NamedTuple):
 
     knot: np.ndarray
     weight: np.ndarray
+    force_knot: np.ndarray
     force_weight: np.ndarray
     offset: np.ndarray
     frame: np.ndarray
@@ -37,7 +38,7 @@ class Commands(NamedTuple):
     bend: np.ndarray
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def desired_motion(path: np.ndarray, dt: float, size: float, layers: Layers) -> np.ndarray:
     """Poses (S + 1, 3) between the knots: constant-twist screws, run through without stops but for corners."""
     T = len(path)
@@ -59,7 +60,7 @@ def desired_motion(path: np.ndarray, dt: float, size: float, layers: Layers) -> 
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _knot_speeds(path: np.ndarray, lengths: np.ndarray, size: float) -> np.ndarray:
     """Path length per interval at the knots: harmonic means (monotone cubics), slowed down in corners, 0 at the ends."""
     T = len(path)
@@ -73,7 +74,7 @@ def _knot_speeds(path: np.ndarray, lengths: np.ndarray, size: float) -> np.ndarr
     return speed
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def screw(start: np.ndarray, stop: np.ndarray, s: float, out: np.ndarray) -> None:
     """Pose at share s of the constant-twist motion between two poses."""
     turn = stop[2] - start[2]
@@ -89,7 +90,7 @@ def screw(start: np.ndarray, stop: np.ndarray, s: float, out: np.ndarray) -> Non
     out[2] = start[2] + s * turn
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def plan_commands(
     scene: View, path: np.ndarray, positions: np.ndarray, loaded: np.ndarray, layers: Layers
 ) -> Commands:
@@ -98,7 +99,7 @@ def plan_commands(
     S = (T - 1) * layers.substeps
     size = np.sqrt(scene.inertia / scene.mass)
     motion = desired_motion(path, scene.dt, size, layers)
-    knot = np.zeros((S + 1, C, 2), np.int64)
+    knot, force_knot = np.zeros((S + 1, C, 2), np.int64), np.zeros((S + 1, C, 2), np.int64)
     weight, force = np.zeros((S + 1, C, 2)), np.zeros((S + 1, C, 2))
     offset = np.zeros((S + 1, C, 2))
     normals, slope, bend = np.zeros((T, C, 2)), np.zeros((T, C)), np.zeros((T, C))
@@ -112,11 +113,13 @@ def plan_commands(
         for i in range(S + 1):
             k = min(i // layers.substeps, T - 2)
             u = (i - k * layers.substeps) / layers.substeps
-            a, b, w, fa, fb, bump_a, bump_b = _schedule(loaded[:, c], k, u, layers)
+            a, b, w, bump_a, bump_b = _place(loaded[:, c], k, u, layers)
             knot[i, c, 0], knot[i, c, 1] = a, b
             weight[i, c, 0], weight[i, c, 1] = 1 - w, w
             if layers.compensation:
-                force[i, c, 0], force[i, c, 1] = fa, fb
+                fa, fb, share = _push(loaded, c, k, u, layers)
+                force_knot[i, c, 0], force_knot[i, c, 1] = fa, fb
+                force[i, c, 0], force[i, c, 1] = share
             away_a, away_b = (1 - w) * lift[a] + bump_a, w * lift[b] + bump_b
             roll_a = (1 - w) * _roll(loaded[:, c], path, motion[i], a, layers)
             roll_b = w * _roll(loaded[:, c], path, motion[i], b, layers)
@@ -128,10 +131,10 @@ def plan_commands(
     frames, knot_frames = (
         (motion, path.copy()) if layers.screw else (np.zeros_like(motion), np.zeros_like(path))
     )
-    return Commands(knot, weight, force, offset, frames, knot_frames, normals, slope, bend)
+    return Commands(knot, weight, force_knot, force, offset, frames, knot_frames, normals, slope, bend)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _stand_off(
     scene: View, pose: np.ndarray, position: np.ndarray, loaded: bool, layers: Layers, normal: np.ndarray
 ) -> tuple[float, float, float]:
@@ -158,30 +161,83 @@ def _stand_off(
     return lift, slope, (lift / distance if at_vertex else 0.0)
 
 
-@njit(cache=True)
-def _schedule(
-    loaded: np.ndarray, k: int, u: float, layers: Layers
-) -> tuple[int, int, float, float, float, float, float]:
-    """At share u of interval k: knots a, b, share of b, force shares of a and b, bumps along their normals [m]."""
+@njit(cache=True, error_model="numpy")
+def _place(loaded: np.ndarray, k: int, u: float, layers: Layers) -> tuple[int, int, float, float, float]:
+    """At share u of interval k, for flags (T,) of one finger: knots a and b, share of b, bumps along their normals [m]."""
     if loaded[k]:
-        if loaded[k + 1]:
-            return k, k + 1, u, 1 - u, u, 0.0, 0.0
-        return k, k, 0.0, 1.0, 0.0, 0.0, 0.0
+        return (k, k + 1, u, 0.0, 0.0) if loaded[k + 1] else (k, k, 0.0, 0.0, 0.0)
     release, approach = k > 0 and loaded[k - 1], loaded[k + 1]
     a, b = k - 1 if release else k, k + 1
     leave = layers.release if release else 0.0
     arrive = 1 - layers.approach if approach else 1.0
     if u < leave:
-        return a, a, 0.0, 1 - u / leave, 0.0, 0.0, 0.0
+        return a, a, 0.0, 0.0, 0.0
     if u >= arrive and approach:
-        ramp = (u - arrive) / (1 - arrive) if arrive < 1 else 1.0
-        return b, b, 1.0, 0.0, ramp, 0.0, 0.0
+        return b, b, 1.0, 0.0, 0.0
     x = (u - leave) / (arrive - leave)
     bump = layers.lift_off * np.sin(np.pi * x)
-    return a, b, x * x * (3 - 2 * x), 0.0, 0.0, bump if release else 0.0, bump if approach else 0.0
+    return a, b, x * x * (3 - 2 * x), bump if release else 0.0, bump if approach else 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _push(
+    loaded: np.ndarray, c: int, k: int, u: float, layers: Layers
+) -> tuple[int, int, tuple[float, float]]:
+    """At share u of interval k: knots a and b and the shares of their forces that finger c exerts.
+
+    Forces balance at the knots, for the fingers loaded there.  Where one comes or goes, all change over at once.
+    """
+    if not loaded[k, c]:
+        if k > 0 and loaded[k - 1, c] and u < layers.release:
+            return k - 1, k - 1, (1 - u / layers.release, 0.0)
+        if loaded[k + 1, c]:
+            return k + 1, k + 1, (_late(u, layers.approach), 0.0)
+        return k, k, (0.0, 0.0)
+    if not loaded[k + 1, c]:
+        return k, k, (1.0, 0.0)
+    begin = 0.0
+    if layers.handover and k > 0 and loaded[k - 1, c] and _leaves(loaded, k - 1):
+        begin = layers.release
+        if u < begin:
+            return k - 1, k, (1 - u / begin, u / begin)
+    share = (u - begin) / (1 - begin)
+    if layers.handover and _leaves(loaded, k):
+        share = 0.0
+    elif layers.handover and _arrives(loaded, k):
+        share = _late(u, layers.approach)
+    return k, k + 1, (1 - share, share)
+
+
+@njit(cache=True, error_model="numpy")
+def _late(u: float, span: float) -> float:
+    """Ramp from 0 to 1 over the last `span` of an interval."""
+    if u >= 1:
+        return 1.0
+    return max(u - (1 - span), 0.0) / span if span > 0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def _leaves(loaded: np.ndarray, k: int) -> bool:
+    """Whether some finger pushes for the last time in interval k."""
+    return _changes(loaded[k], loaded[k + 1])
+
+
+@njit(cache=True, error_model="numpy")
+def _arrives(loaded: np.ndarray, k: int) -> bool:
+    """Whether some finger pushes for the first time at the end of interval k."""
+    return _changes(loaded[k + 1], loaded[k])
+
+
+@njit(cache=True, error_model="numpy")
+def _changes(now: np.ndarray, then: np.ndarray) -> bool:
+    """Whether some flag is set now and not then."""
+    for c in range(len(now)):  # noqa: SIM110  (numba knows no generators here)
+        if now[c] and not then[c]:
+            return True
+    return False
+
+
+@njit(cache=True, error_model="numpy")
 def _roll(loaded: np.ndarray, path: np.ndarray, pose: np.ndarray, t: int, layers: Layers) -> float:
     """Distance that a round finger rolls along the facet since its contact began."""
     if not layers.rolling or not loaded[t]:
@@ -192,7 +248,7 @@ def _roll(loaded: np.ndarray, path: np.ndarray, pose: np.ndarray, t: int, layers
     return layers.radius * (pose[2] - path[start, 2])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def command(
     table: Commands,
     positions: np.ndarray,
@@ -222,13 +278,14 @@ def command(
             x, y = table.offset[i, c, 0], table.offset[i, c, 1]
             for side in range(2):
                 t, w, f = table.knot[i, c, side], table.weight[i, c, side], table.force_weight[i, c, side]
-                x += w * local[0, t, c, 0] + f * local[1, t, c, 0]
-                y += w * local[0, t, c, 1] + f * local[1, t, c, 1]
+                j = table.force_knot[i, c, side]
+                x += w * local[0, t, c, 0] + f * local[1, j, c, 0]
+                y += w * local[0, t, c, 1] + f * local[1, j, c, 1]
             out[i, c, 0] = frame[0] + cs * x - sn * y
             out[i, c, 1] = frame[1] + sn * x + cs * y
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def pull_back(
     table: Commands, adjoint: np.ndarray, stiffness: float, positions: np.ndarray, forces: np.ndarray
 ) -> None:
@@ -245,7 +302,8 @@ def pull_back(
                 t, w, f = table.knot[i, c, side], table.weight[i, c, side], table.force_weight[i, c, side]
                 knots[t, c, 0] += w * bx
                 knots[t, c, 1] += w * by
-                _add_to_world(table.knot_frame[t], f * bx / stiffness, f * by / stiffness, forces[t, c])
+                j = table.force_knot[i, c, side]
+                _add_to_world(table.knot_frame[j], f * bx / stiffness, f * by / stiffness, forces[j, c])
     for t in range(T):
         for c in range(C):
             n, gx, gy = table.normal[t, c], knots[t, c, 0], knots[t, c, 1]
@@ -256,7 +314,7 @@ def pull_back(
             )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _add_to_world(frame: np.ndarray, x: float, y: float, out: np.ndarray) -> None:
     cs, sn = np.cos(frame[2]), np.sin(frame[2])
     out[0] += cs * x - sn * y

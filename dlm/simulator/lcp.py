@@ -20,7 +20,7 @@ ROW = np.dtype([(name, "f8") for name in ("x", "y", "turn", "c", "P", "rhs", "sa
 """Row of the problem: direction and lever (the contact Jacobian), c, impulse, and scratch for the linear system."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def solve_contacts(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray, B: np.ndarray) -> bool:
     """Solve for the impulses with n contacts; contacts.state holds the active set.  False where only the sweeps' answer was found."""
     for r in range(2 * n):
@@ -37,7 +37,7 @@ def solve_contacts(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray
     return False
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def sweep(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray, sweeps: int) -> None:
     """Projected Gauss-Seidel, contact by contact."""
     m = 2 * n
@@ -57,7 +57,7 @@ def sweep(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray, sweeps:
                     rows[r].P = min(max(p, -limit), limit)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def guess_states(n: int, contacts: np.ndarray, rows: np.ndarray) -> None:
     """Read the states off the impulses."""
     for i in range(n):
@@ -73,7 +73,7 @@ def guess_states(n: int, contacts: np.ndarray, rows: np.ndarray) -> None:
             contacts[i].state = STICK
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def newton(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray, B: np.ndarray) -> bool:
     """Solve the linear system of the guessed states and correct them until they agree with their solution."""
     guess_states(n, contacts, rows)
@@ -89,7 +89,7 @@ def newton(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray, B: np.
     return False
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def reduced_system(
     n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray, B: np.ndarray, transposed: bool
 ) -> int:
@@ -122,7 +122,7 @@ def reduced_system(
     return row
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def expand(n: int, contacts: np.ndarray, rows: np.ndarray) -> None:
     """Impulses P from the reduced solution in the right-hand sides."""
     row = 0
@@ -142,7 +142,7 @@ def expand(n: int, contacts: np.ndarray, rows: np.ndarray) -> None:
         row += 1
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _correct_states(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray) -> bool:
     """Flip the states that contradict the impulses; return whether any did."""
     m = 2 * n
@@ -177,7 +177,7 @@ def _correct_states(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarra
     return changed
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _velocity(rows: np.ndarray, A: np.ndarray, r: int, m: int) -> float:
     y = rows[r].c
     for s in range(m):
@@ -185,7 +185,7 @@ def _velocity(rows: np.ndarray, A: np.ndarray, r: int, m: int) -> float:
     return y
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def solve_linear(B: np.ndarray, rows: np.ndarray, size: int) -> bool:
     """Gaussian elimination with partial pivoting, in place; False for a singular matrix."""
     for k in range(size):

@@ -173,7 +173,7 @@ def _contacts(rows: Array) -> ContactTrace:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _trace(
     scene: View, physics: Physics, commands: np.ndarray, motion: Motion, work: Work
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -207,7 +207,7 @@ def _trace(
     return out[:count], laws, finger_work
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _residuals(
     n: int,
     scene: View,

@@ -28,7 +28,7 @@ class Motion(NamedTuple):
     near: np.ndarray
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def motion_for(samples: int, fingers: int) -> Motion:
     """Empty states."""
     return Motion(
@@ -40,7 +40,7 @@ def motion_for(samples: int, fingers: int) -> Motion:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def advance(
     scene: View, physics: Physics, commands: np.ndarray, start: int, motion: Motion, work: Work
 ) -> bool:
@@ -70,7 +70,7 @@ def advance(
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def finite(motion: Motion, i: int) -> bool:
     """Whether state i is made of finite numbers."""
     total = 0.0
@@ -81,20 +81,20 @@ def finite(motion: Motion, i: int) -> bool:
     return np.isfinite(total)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def start_motion(table: Commands, positions: np.ndarray, forces: np.ndarray, motion: Motion) -> None:
     """Object at rest at its first pose, fingers where the plan has them."""
     command(table, positions, forces, np.inf, motion.fingers[:1])
     motion.velocities[0] = 0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def acceptable(positions: np.ndarray, forces: np.ndarray) -> bool:
     """Whether a plan is made of finite numbers that leave room to compute with."""
     return np.abs(positions).max() < 1e100 and np.abs(forces).max() < 1e100
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, error_model="numpy", nogil=True)
 def execute_batch(
     scenes: SceneArrays,
     physics: Physics,

@@ -33,6 +33,7 @@ class Layers(NamedTuple):
     lift_off: float
     parking: float
     rolling: bool
+    handover: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +47,7 @@ class Execution:
     lift_off [m]: bump along the facet normal on the way from and to a facet.
     parking [m]: least distance from the object at knots where the finger is not loaded; 0 leaves it where planned.
     rolling: correct the rolling of round fingers along the facet.
+    handover: where a finger comes or goes, the others change their forces in step with its ramp, not ahead of it.
     """
 
     material_point: bool = True
@@ -56,6 +58,7 @@ class Execution:
     lift_off: float = 5e-3
     parking: float = 5e-3
     rolling: bool = True
+    handover: bool = True
 
     def __post_init__(self) -> None:
         require(self.timing in ("pchip", "linear"), "execution.timing", "pchip or linear", self.timing)
@@ -127,4 +130,5 @@ class SimulatorSettings:
             float(e.lift_off),
             float(e.parking),
             e.rolling,
+            e.handover,
         )

@@ -48,7 +48,7 @@ class Work(NamedTuple):
     finger_velocity: np.ndarray
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def work_for(fingers: int, walls: int) -> Work:
     """Scratch memory for scenes with at most so many fingers and walls."""
     size = 2 * fingers + WALL_POINTS * walls
@@ -66,7 +66,7 @@ def work_for(fingers: int, walls: int) -> Work:
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def solve_step(
     scene: View,
     physics: Physics,
@@ -98,7 +98,7 @@ def solve_step(
     return n, _solve_velocities(n, scene, physics, work)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _contact_rows(n: int, q: np.ndarray, contacts: np.ndarray, rows: np.ndarray) -> None:
     """Contact Jacobian: row 2 i is the normal direction of contact i, row 2 i + 1 the normal turned by +90 degrees."""
     for i in range(n):
@@ -109,7 +109,7 @@ def _contact_rows(n: int, q: np.ndarray, contacts: np.ndarray, rows: np.ndarray)
         tangent.x, tangent.y, tangent.turn = -ny, nx, ax * nx + ay * ny
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def softness(gap: float, kappa: float, regularization: float) -> float:
     """Compliance of a contact over its scale: (1 - a) / a for activation a, never below the floor."""
     if np.isinf(kappa):
@@ -118,7 +118,7 @@ def softness(gap: float, kappa: float, regularization: float) -> float:
     return regularization + (1 - a) / a
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def bias(gap: float, h: float, kappa: float) -> float:
     """Velocity that the normal row adds: what closes an open gap, or what removes a share of a penetration."""
     if gap < -SHALLOW:
@@ -126,19 +126,19 @@ def bias(gap: float, h: float, kappa: float) -> float:
     return gap / h if gap < 0 or np.isinf(kappa) else 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def finger_mobility(stiffness: float, damping: float, h: float) -> float:
     """Velocity of a finger per impulse on it."""
     return 1 / (h * (stiffness * h + damping))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def contact_scale(mass: float, inertia: float, lever: float, give: float) -> float:
     """What a row would have on the diagonal of A for a free object: the unit of the contact's compliance."""
     return 1 / mass + lever * lever / inertia + give
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def assemble_problem(n: int, scene: View, physics: Physics, work: Work) -> None:
     """A = J W J^T + finger mobility + compliance and c = relative velocity without impulses + bias."""
     h = scene.dt / physics.substeps
@@ -164,7 +164,7 @@ def assemble_problem(n: int, scene: View, physics: Physics, work: Work) -> None:
         row.c = c if r % 2 == 1 else c + bias(contact.gap, h, physics.kappa)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _solve_velocities(n: int, scene: View, physics: Physics, work: Work) -> bool:
     """Solve the contact problem and apply its impulses."""
     exact = True
@@ -175,7 +175,7 @@ def _solve_velocities(n: int, scene: View, physics: Physics, work: Work) -> bool
     return exact
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", inline="always")
 def _apply_impulses(n: int, scene: View, physics: Physics, work: Work) -> None:
     """Velocities of object and fingers from the impulses."""
     give = finger_mobility(scene.stiffness, physics.damping, scene.dt / physics.substeps)
@@ -194,7 +194,7 @@ def _apply_impulses(n: int, scene: View, physics: Physics, work: Work) -> None:
         work.velocity[k] = work.free[k] + W[k, 0] * x + W[k, 1] * y + W[k, 2] * turn
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _with_support(n: int, scene: View, physics: Physics, q: np.ndarray, v: np.ndarray, work: Work) -> bool:
     """Contacts and support friction together, by Newton steps in velocity and friction (Chan, Golub, Mulet).
 
@@ -214,13 +214,13 @@ def _with_support(n: int, scene: View, physics: Physics, q: np.ndarray, v: np.nd
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def vertex_arm(x: float, y: float, cs: float, sn: float) -> tuple[float, float]:
     """A vertex seen from the centre of mass, world frame, for cosine and sine of the object's angle."""
     return cs * x - sn * y, sn * x + cs * y
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def support_directions(facets: np.ndarray, q: np.ndarray, velocity: np.ndarray) -> np.ndarray:
     """Directions w (V, 2) that the support friction opposes."""
     w = np.zeros((len(facets), 2))
@@ -233,7 +233,7 @@ def support_directions(facets: np.ndarray, q: np.ndarray, velocity: np.ndarray) 
     return w
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def support_mobility(
     scene: View,
     physics: Physics,
@@ -273,7 +273,7 @@ def support_mobility(
         work.free[i] = work.mobility[i, 0] * b[0] + work.mobility[i, 1] * b[1] + work.mobility[i, 2] * b[2]
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _update_directions(
     facets: np.ndarray, q: np.ndarray, before: np.ndarray, after: np.ndarray, friction: np.ndarray
 ) -> float:
@@ -295,7 +295,7 @@ def _update_directions(
     return largest
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def invert(K: np.ndarray, out: np.ndarray) -> None:
     """Inverse of a symmetric positive definite (3, 3) matrix by cofactors."""
     for i in range(3):

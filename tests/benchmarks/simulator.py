@@ -45,6 +45,7 @@ ABLATIONS = {
     "constant speed": Execution(timing="linear"),
     "no compensation": Execution(compensation=False),
     "no approach, no release": Execution(approach=0, release=0),
+    "no handover": Execution(handover=False),
     "no lift-off": Execution(lift_off=0),
     "no parking": Execution(parking=0),
     "all off": Execution(
