@@ -28,7 +28,7 @@ report: setup
 	$(BIN)/python evaluate.py experiment=$(EXPERIMENT)
 
 test: setup
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 lint: setup
 	$(BIN)/ruff format --check .
@@ -53,4 +53,5 @@ gallery: setup
 	done
 
 clean:
+	find expert datasets dlm tests -name __pycache__ -prune -exec rm -rf {} +
 	rm -rf .venv .mypy_cache .pytest_cache .ruff_cache .import_linter_cache *.egg-info

@@ -73,7 +73,7 @@ def test_pivots_hold_one_ground_vertex_still_and_mechanics_sees_it_stick(
     travel = np.abs(path - path[0]).max(axis=(0, 2))
     pivot = int(travel.argmin())
     assert travel[pivot] < 1e-15
-    assert (np.delete(path[-1, :, 1], pivot) >= 1e-3).all()
+    assert (np.delete(path[-1, :, 1], pivot) > 1e-3 - 1e-9).all()
     assert 0.1 <= abs(task.trajectory.poses[steps - 1, 2]) <= 0.5
     contacts = [c for c in external_contacts(task) if c.step < steps - 1]
     assert {(c.step, c.vertex) for c in contacts} == {(t, pivot) for t in range(steps - 1)}
