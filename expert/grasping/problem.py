@@ -8,26 +8,12 @@ from typing import Literal
 
 import numpy as np
 
-from expert.caging.problem import Arrangement, Shape
+from expert.caging.problem import Arrangement, Gripper, Shape
 from expert.geometry.pose import Array
 from expert.types import readonly, require
 
 GraspStatus = Literal["certified", "uncertified", "none_found", "time_limit"]
 GraspCost = Literal["attraction", "acceleration"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Jaws:
-    """Parallel jaws: fingers `fingers` keep one distance direction, their opening stays within `opening` [m]."""
-
-    fingers: tuple[int, int]
-    opening: tuple[float, float]
-
-    def __post_init__(self) -> None:
-        i, j = self.fingers
-        require(i != j and min(i, j) >= 0, "grippers.fingers", "two different indices", list(self.fingers))
-        least, most = self.opening
-        require(0 <= least <= most < np.inf, "grippers.opening", "0 <= least <= most", [least, most])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +31,7 @@ class GraspProblem:
     count: int = 4
     half_ranges: Array = field(default_factory=lambda: np.radians([15, 11.25, 7.5, 3.75, 0.5]))
     cost: GraspCost = "attraction"
-    grippers: tuple[Jaws, ...] = ()
+    grippers: tuple[Gripper, ...] = ()
     margin: float = 0.001
 
     def __post_init__(self) -> None:
@@ -54,7 +40,7 @@ class GraspProblem:
         object.__setattr__(self, "half_ranges", ranges)
         require(self.count in (3, 4), "fingers.count", "3 or 4", self.count)
         decreasing = len(ranges) >= 2 and bool((np.diff(ranges) < 0).all())
-        inside = decreasing and 0 < ranges[-1] and ranges[0] < np.pi / 2
+        inside = decreasing and ranges[-1] > 0 and ranges[0] < np.pi / 2
         what = "two or more decreasing angles between 0 and 90 deg"
         require(inside, "options.half_ranges", what, np.degrees(ranges).round(3).tolist())
         require(0 < self.margin < 0.1, "options.margin", "a fraction between 0 and 0.1", self.margin)
