@@ -1,4 +1,4 @@
-"""Derivatives of rollouts: the adjoint of the time step by the implicit function theorem, and central differences.
+"""Derivatives of rollouts: the adjoint of the time step by the implicit function theorem.
 
 With the active set known, the impulses solve linear equations B P + c = 0; their derivative needs one solve with B^T.
 What remains is the chain rule through the contact geometry, kept here in the order of the forward computation reversed.
@@ -8,9 +8,9 @@ import numpy as np
 from numba import njit
 
 from dlm.simulator.contact import FACET, WALL, View, view
-from dlm.simulator.execution import Commands, command, plan_commands, pull_back
+from dlm.simulator.execution import command, plan_commands, pull_back
 from dlm.simulator.lcp import OPEN, SLIP_PLUS, STICK, reduced_system, solve_linear
-from dlm.simulator.rollout import Motion, acceptable, advance, motion_for, start_motion
+from dlm.simulator.rollout import acceptable, advance, motion_for, start_motion
 from dlm.simulator.scene import SceneArrays
 from dlm.simulator.settings import Layers, Physics
 from dlm.simulator.step import (
@@ -299,109 +299,3 @@ def implicit_batch(
         if not (np.isfinite(d_positions[b]).all() and np.isfinite(d_forces[b]).all()):
             d_positions[b], d_forces[b] = 0, 0
     return d_positions, d_forces
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def difference_batch(
-    scenes: SceneArrays,
-    physics: Physics,
-    layers: Layers,
-    positions: np.ndarray,
-    forces: np.ndarray,
-    loaded: np.ndarray,
-    start: np.ndarray,
-    adjoint: np.ndarray,
-    step: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """The same by central differences: `step` [m] in positions, step * stiffness [N] in forces (the same commands)."""
-    B, T, C = loaded.shape
-    d_positions, d_forces = np.zeros_like(positions), np.zeros_like(forces)
-    work = work_for(C, scenes.walls.shape[1])
-    S = (T - 1) * layers.substeps
-    base, other = motion_for(S + 1, C), motion_for(S + 1, C)
-    commands, changed = np.zeros((S + 1, C, 2)), np.zeros((S + 1, C, 2))
-    for b in range(B):
-        if not acceptable(positions[b], forces[b]):
-            continue
-        scene, path = view(scenes, b), scenes.path[b]
-        table = plan_commands(scene, path, positions[b], loaded[b], layers)
-        command(table, positions[b], forces[b], scene.stiffness, commands)
-        base.poses[0] = start[b]
-        start_motion(table, positions[b], forces[b], base)
-        if not advance(scene, physics, commands, 0, base, work):
-            continue
-        plan = np.stack((positions[b], forces[b]))
-        for t in range(T):
-            for c in range(C):
-                bent = table.slope[t, c] != 0 or table.bend[t, c] != 0
-                same = not bent and acts_alike(table, t, c)
-                for d in range(2):
-                    for which in range(2):
-                        if which == 1 and same:
-                            d_forces[b, t, c, d] = d_positions[b, t, c, d] / scene.stiffness
-                            continue
-                        size = step if which == 0 else step * scene.stiffness
-                        total, kept = 0.0, plan[which, t, c, d]
-                        for sign in (1.0, -1.0):
-                            plan[which, t, c, d] = kept + sign * size
-                            moved = table
-                            if which == 0 and bent:
-                                moved = plan_commands(scene, path, plan[0], loaded[b], layers)
-                            command(moved, plan[0], plan[1], scene.stiffness, changed)
-                            first = _restart(moved, plan, physics.damping, c, commands, changed, base, other)
-                            if first < S:
-                                advance(scene, physics, changed, first, other, work)
-                            for k in range(first // layers.substeps + 1, T):
-                                i = k * layers.substeps
-                                for e in range(3):
-                                    total += sign * adjoint[b, k, e] * (other.poses[i, e] - base.poses[i, e])
-                        plan[which, t, c, d] = kept
-                        gradient = d_positions if which == 0 else d_forces
-                        gradient[b, t, c, d] = total / (2 * size)
-    return d_positions, d_forces
-
-
-@njit(cache=True, error_model="numpy")
-def acts_alike(table: Commands, t: int, c: int) -> bool:
-    """Whether force and position of finger c at knot t move the commands alike, and the start not at all."""
-    for i in range(len(table.knot)):
-        place, push = 0.0, 0.0
-        for side in range(2):
-            place += table.weight[i, c, side] * (table.knot[i, c, side] == t)
-            push += table.force_weight[i, c, side] * (table.force_knot[i, c, side] == t)
-        if place != push or (i == 0 and place != 0):
-            return False
-    return True
-
-
-@njit(cache=True, error_model="numpy")
-def _restart(
-    table: Commands,
-    plan: np.ndarray,
-    damping: float,
-    c: int,
-    commands: np.ndarray,
-    changed: np.ndarray,
-    base: Motion,
-    other: Motion,
-) -> int:
-    """Substep from which the changed commands of finger c act, with the state there copied from the unchanged motion.
-
-    The number of substeps where they never do, because the finger is away from the object while they differ.
-    """
-    S = len(commands) - 1
-    other.poses[0] = base.poses[0]
-    start_motion(table, plan[0], plan[1], other)
-    first, last = 0, S
-    if (other.fingers[0] == base.fingers[0]).all():
-        while first < S and (commands[first + 1] == changed[first + 1]).all():
-            first += 1
-    while damping == 0 and last > first and (commands[last] == changed[last]).all():
-        last -= 1
-    # A finger without mass and damper forgets within a step where it has been.
-    if not base.near[first : min(last + 1, S), c].any():
-        return S
-    if first > 0:
-        other.poses[first], other.velocities[first] = base.poses[first], base.velocities[first]
-        other.fingers[first] = base.fingers[first]
-    return first

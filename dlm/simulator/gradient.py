@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 import torch
 
-from dlm.simulator.adjoint import difference_batch, implicit_batch
+from dlm.simulator.adjoint import implicit_batch
+from dlm.simulator.differences import difference_batch
 from dlm.simulator.rollout import execute_batch
 from dlm.simulator.scene import SceneBatch
 from dlm.simulator.settings import SimulatorSettings
@@ -35,6 +36,7 @@ class _Rollout(torch.autograd.Function):
         start: np.ndarray,
         settings: SimulatorSettings,
     ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Poses (B, T, 3), float64, and status (B,)."""
         p, f = _array(positions), _array(forces)
         poses, ok = execute_batch(batch.arrays, settings.physics, settings.layers, p, f, loaded, start)
         ctx.problem = batch, p, f, loaded, start, settings
@@ -45,6 +47,7 @@ class _Rollout(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx: Any, *adjoints: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        """Gradients of positions and forces, by the settings' method."""
         batch, p, f, loaded, start, settings = ctx.problem
         common = batch.arrays, settings.physics, settings.layers, p, f, loaded, start, _array(adjoints[0])
         if settings.gradient == "implicit":
