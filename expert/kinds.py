@@ -65,6 +65,13 @@ KINDS: dict[str, Kind] = {
         draw="expert.drawing.cage:draw",
         solved=("caged",),
     ),
+    "certified_grasp": Kind(
+        format="expert.files.certified_grasp",
+        solve="expert.grasping.synthesis:solve",
+        verify="expert.verify.grasp:verify",
+        draw="expert.drawing.certified_grasp:draw",
+        solved=("certified",),
+    ),
 }
 
 

@@ -41,7 +41,7 @@ def read(data: dict[str, Any]) -> tuple[CageProblem | Arrangement, dict[str, Any
         **common,
         count=fingers.integer("count"),
         fixed=fixed,
-        grippers=_read_grippers(fingers),
+        grippers=read_grippers(fingers),
         parallel=_flag(fingers, "parallel"),
         cost=file.choice("cost", COSTS, "none"),  # type: ignore[arg-type]
         margin=options.number("margin", 0.002),
@@ -57,7 +57,7 @@ def read(data: dict[str, Any]) -> tuple[CageProblem | Arrangement, dict[str, Any
 def _read_shape(section: Section) -> Shape:
     if "pieces" not in section:
         vertices = section.array("vertices", (None, 2))
-        _require_size(section.path("vertices"), vertices)
+        require_size(section.path("vertices"), vertices)
         return Shape(vertices=vertices)
     listed = section.take("pieces", "a list of convex polygons")
     if not isinstance(listed, list):
@@ -68,13 +68,14 @@ def _read_shape(section: Section) -> Shape:
         checked_array(piece, (None, 2), f"{section.path('pieces')}[{k}]") for k, piece in enumerate(listed)
     )
     for k, piece in enumerate(pieces):
-        _require_size(f"{section.path('pieces')}[{k}]", piece)
+        require_size(f"{section.path('pieces')}[{k}]", piece)
     if "vertices" in section:
         return Shape(vertices=section.array("vertices", (None, 2)), pieces=pieces)
     return Shape.of_pieces(pieces)
 
 
-def _require_size(field: str, points: Array) -> None:
+def require_size(field: str, points: Array) -> None:
+    """Raise InvalidProblem for points that almost coincide."""
     if len(points) and np.ptp(points, axis=0).max() < SMALLEST:
         raise InvalidProblem(field, expected=f"a polygon larger than {SMALLEST:g} m", got="a smaller one")
 
@@ -92,7 +93,8 @@ def _read_arrangement(file: Section, fingers: Section, fixed: Array, common: dic
     )
 
 
-def _read_grippers(fingers: Section) -> tuple[Gripper, ...]:
+def read_grippers(fingers: Section) -> tuple[Gripper, ...]:
+    """The list of grippers in a section of fingers.  Raises InvalidProblem."""
     grippers = []
     for gripper in fingers.sections("grippers", ("fingers", "opening")):
         i, j = gripper.array("fingers", (2,))
