@@ -1,41 +1,97 @@
-"""Train the architectures of Table 4.1: `python train.py stage=nn|nnm|mdr|cvx|dlm|all model=thesis seed=0`."""
+"""Train the architectures of Table 4.1: `python train.py stage=nn|nnm|mdr|cvx|dlm|all model=thesis seed=0`.
 
+`python train.py experiment=table_4_1` trains all of them on five seeds, in two processes.
+"""
+
+import copy
+import sys
+import time
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
+import torch
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
 from datasets.entry import entry_point
-from dlm.checkpoint import load, restore_weights
+from dlm.checkpoint import load, read_about, restore_weights
 from dlm.evaluation.watch import watch
 from dlm.models import Policy
+from dlm.parallel import chains, run_side_by_side
 from dlm.tasks import TaskBatch, read_all
 from dlm.training import Stage, Training, fit
+from expert.errors import InvalidProblem
+from expert.types import require
 
 
 @entry_point("train")
 def main(cfg: DictConfig) -> None:
-    """Train the chosen stages, each after the one whose weights it starts from."""
+    """Train the chosen stages on the chosen seeds, each after the one whose weights it starts from."""
+    seeds = [cfg.seed] if cfg.seeds is None else list(cfg.seeds)
+    require(len(seeds) > 0, "seeds", "at least one seed", seeds, "seeds=[0,1,2]")
+    require(isinstance(cfg.jobs, int) and cfg.jobs >= 1, "jobs", "a number of processes", cfg.jobs)
+    runs = [of_seed(cfg, seed) for seed in seeds]
+    stages = list(stages_of(cfg).values())
     tasks = read_all(cfg.data)
-    stages = [instantiate(node, _convert_="object") for node in cfg.stages.values()]
-    for stage in stages:
-        path = train_stage(cfg, stage, tasks)
-        print(f"{stage.name}: {path}")
-    print(f"curves: tensorboard --logdir {folder(cfg) / 'tensorboard'}")
-    print(f"next: python evaluate.py output={cfg.output} seeds=[{cfg.seed}]")
+    if cfg.jobs == 1:
+        for run in runs:
+            for stage in stages:
+                print(train_stage(run, stage, tasks))
+    else:
+        train_side_by_side(cfg, runs, stages)
+    print(f"curves: tensorboard --logdir {folder(runs[0]) / 'tensorboard' if len(runs) == 1 else cfg.output}")
+    print(f"next: python evaluate.py output={cfg.output} seeds=[{','.join(map(str, seeds))}]")
 
 
-def train_stage(cfg: DictConfig, stage: Stage, tasks: dict[str, TaskBatch]) -> Path:
-    """One stage, from fresh weights or from those of its warm start; the checkpoint's path."""
+def of_seed(cfg: DictConfig, seed: int) -> DictConfig:
+    """The configuration with one seed."""
+    one = copy.deepcopy(cfg)
+    one.seed = seed
+    return one
+
+
+def stages_of(cfg: DictConfig) -> dict[str, Stage]:
+    """The stages to train, by name, in order."""
+    return {name: instantiate(node, _convert_="object") for name, node in cfg.stages.items()}
+
+
+def train_side_by_side(cfg: DictConfig, runs: Sequence[DictConfig], stages: Sequence[Stage]) -> None:
+    """Train several stages of several seeds at a time, the longest chains of stages first."""
+    rows = [(run, chain) for chain in chains(stages) for run in runs]
+    calls = [partial(train_chain, run, [stage.name for stage in chain]) for run, chain in rows]
+    total = len(runs) * len(stages) * cfg.schedule.iterations
+    done = partial(iterations_done, runs, stages, time.time())
+    try:
+        for line in run_side_by_side(calls, jobs=cfg.jobs, progress=done, total=total):
+            print(line, flush=True)
+    except KeyboardInterrupt:
+        print(
+            f"interrupted after {done()} of {total} iterations; the same command with resume=true goes on",
+            file=sys.stderr,
+        )
+        raise
+
+
+def train_chain(cfg: DictConfig, names: Sequence[str]) -> list[str]:
+    """Stages of one seed in order, in a process of their own."""
+    tasks, stages = read_all(cfg.data), stages_of(cfg)
+    return [train_stage(cfg, stages[name], tasks) for name in names]
+
+
+def train_stage(cfg: DictConfig, stage: Stage, tasks: dict[str, TaskBatch]) -> str:
+    """One stage, from fresh weights or from those of its warm start; a line that says where it is."""
+    torch.set_num_threads(cfg.threads)
     schedule = instantiate(cfg.schedule)
     model = instantiate(cfg.model, _convert_="object")
     policy = model.build(stage.policy, instantiate(cfg.solver), seed=cfg.seed)
     policy.fit_centre(tasks["train"])
     if stage.warm_start:
         start_from(cfg, stage.warm_start, policy, model.name)
-    path = folder(cfg) / f"{stage.name}.safetensors"
+    path = checkpoint(cfg, stage)
+    training = Training(policy, stage.loss, tasks[stage.dataset], schedule)
     fit(
-        Training(policy, stage.loss, tasks[stage.dataset], schedule),
+        training,
         stage,
         path=path,
         model=model.name,
@@ -43,7 +99,7 @@ def train_stage(cfg: DictConfig, stage: Stage, tasks: dict[str, TaskBatch]) -> P
         watch=watch(tasks, instantiate(cfg.watch, _convert_="object")),
         resume=cfg.resume,
     )
-    return path
+    return f"{stage.name}: {path} ({training.seconds:.0f} s of processor time)"
 
 
 def start_from(cfg: DictConfig, earlier: str, policy: Policy, model: str) -> None:
@@ -56,6 +112,23 @@ def start_from(cfg: DictConfig, earlier: str, policy: Policy, model: str) -> Non
 def folder(cfg: DictConfig) -> Path:
     """Where the checkpoints of one seed are."""
     return Path(cfg.output) / f"seed_{cfg.seed}"
+
+
+def checkpoint(cfg: DictConfig, stage: Stage) -> Path:
+    """Where the checkpoint of one stage of one seed is."""
+    return folder(cfg) / f"{stage.name}.safetensors"
+
+
+def iterations_done(runs: Sequence[DictConfig], stages: Sequence[Stage], start: float) -> int:
+    """Iterations in the checkpoints of all runs; those written before `start` count only if they are gone on from."""
+    done = 0
+    for path in (checkpoint(run, stage) for run in runs for stage in stages):
+        try:
+            if runs[0].resume or path.stat().st_mtime >= start:
+                done += read_about(path, command="").iteration
+        except (FileNotFoundError, InvalidProblem):
+            continue  # not begun, or about to be refused by the worker
+    return done
 
 
 def settings(cfg: DictConfig, stage: Stage) -> dict[str, object]:

@@ -33,7 +33,7 @@ class About:
     """What made a checkpoint.
 
     model: architecture, by name.  settings: all training settings as plain values.  data: fingerprint of the training data.
-    history: one row of named losses per logged iteration.
+    history: one row of named losses per logged iteration.  seconds: processor time so far.
     """
 
     stage: str
@@ -42,6 +42,7 @@ class About:
     settings: dict[str, object]
     data: str
     history: list[dict[str, float]]
+    seconds: float = 0.0
     versions: dict[str, str] = field(default_factory=versions)
     schema: int = SCHEMA
 

@@ -5,6 +5,7 @@ A stage can be stopped at any moment; continued from its last checkpoint it take
 
 import shutil
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,7 +57,7 @@ class Schedule:
 
 
 class Training:
-    """State of one stage: everything that the next iteration depends on."""
+    """State of one stage: everything that the next iteration depends on; seconds: processor time that it took so far."""
 
     def __init__(self, policy: Policy, loss: Loss, tasks: TaskBatch, schedule: Schedule) -> None:
         require(
@@ -66,6 +67,7 @@ class Training:
         self.optimiser = torch.optim.Adam(policy.parameters(), lr=schedule.learning_rate)
         self.iteration = 0
         self.history: list[Row] = []
+        self.seconds = 0.0
 
     def iterate(self) -> float:
         """One pass over the tasks in random order; the mean loss."""
@@ -103,6 +105,7 @@ class Training:
             settings=settings,
             data=self.tasks.fingerprint,
             history=self.history,
+            seconds=self.seconds,
         )
         return Checkpoint(
             about=about,
@@ -117,6 +120,7 @@ class Training:
         restore_optimiser(self.optimiser, saved.optimiser)
         torch.set_rng_state(saved.random)
         self.iteration, self.history = saved.about.iteration, list(saved.about.history)
+        self.seconds = saved.about.seconds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,8 +170,11 @@ def _iterations(training: Training, title: str) -> Iterator[float]:
     total = training.schedule.iterations
     with _progress() as progress:
         bar = progress.add_task(title, total=total, completed=training.iteration)
+        start = time.process_time()
         while training.iteration < total:
             loss = training.iterate()
+            start, before = time.process_time(), start
+            training.seconds += start - before  # with what was measured since the iteration before
             yield loss
             progress.update(bar, completed=training.iteration, description=f"{title} {loss:.3g}")
 
@@ -175,7 +182,7 @@ def _iterations(training: Training, title: str) -> Iterator[float]:
 def checked(path: Path, stage: Stage, tasks: TaskBatch, settings: Mapping[str, object]) -> Checkpoint:
     """A checkpoint that this very training may continue.  Raises InvalidProblem where data or settings have changed."""
     saved = load(path, command=f"python train.py stage={stage.name}")
-    again = "drop resume=true to train from the start"
+    again = "resume=false trains from the start"
     if saved.about.data != tasks.fingerprint:
         raise InvalidProblem(
             f"checkpoint {path}",
