@@ -69,19 +69,14 @@ class Outcome:
     limited: bool
 
 
-class Search:
-    """The tree and its tables for one task."""
+class Tree:
+    """Complete mode sequences, visited best first; whoever grows it says which (`Search`: all of them)."""
 
     def __init__(self, model: Model, fingers: int, gap: float) -> None:
         self.model, self.fingers, self.gap = model, fingers, gap
-        self.moves: Moves = moves_of(model.facets, fingers, model.min_interval)
-        self.phi = step_costs(model, fingers)
-        self.windows = window_costs(model)
-        self.to_go = cost_to_go(self.phi, self.windows, self.moves, last_costs(model, self.phi, self.moves))
         self.best, self.nodes = Best(), 0
         self.heap: list[tuple[float, int, Prefix | Leaf]] = []
         self.pushed = 0
-        self.smoothing: dict[tuple[int, ...], float] = {}
         self.pruned = np.inf  # least bound of all that was cut off
 
     @property
@@ -92,19 +87,20 @@ class Search:
 
     def run(self, *, node_limit: int | None, deadline: float) -> Outcome:
         """Search until the gap closes, the tree is empty or a budget is spent."""
-        states = self.moves.states
-        starts = np.flatnonzero(((states == 0) | (states % 3 == 1)).all(axis=1))  # free, or just arrived
-        for s in reversed(starts):  # of equals the last is expanded first: fingers without use stay free
-            self._push_prefix((), int(s), 0.0, 0.0)
         while self.heap and self.heap[0][0] < self.cutoff:
             if time.perf_counter() > deadline or (node_limit is not None and self.nodes >= node_limit):
                 return self._outcome(limited=True)
             bound, _, node = heapq.heappop(self.heap)
-            if isinstance(node, Prefix):
-                self._expand(bound, node)
-            else:
-                self._visit(bound, node)
+            self._open(bound, node)
         return self._outcome(limited=False)
+
+    def offer(self, bound: float, sequence: Sequence, lo: Array, hi: Array) -> None:
+        """Let the search visit a complete sequence over a box of contact positions; no plan in it costs less than `bound`."""
+        self._push(bound, Leaf(sequence, lo, hi, np.full_like(sequence.modes, -1)))
+
+    def _open(self, bound: float, node: Prefix | Leaf) -> None:
+        if isinstance(node, Leaf):
+            self._visit(bound, node)
 
     def _outcome(self, limited: bool) -> Outcome:
         bound = min(self.heap[0][0] if self.heap else np.inf, self.pruned, self.best.cost)
@@ -117,63 +113,6 @@ class Search:
         self.pushed += 1
         # ties: the deeper node first, so that plans are found early
         heapq.heappush(self.heap, (bound, -self.pushed, node))
-
-    # prefixes of modes
-
-    def _push_prefix(
-        self, parent: tuple[tuple[int, ...], ...], state: int, forces: float, smooth: float
-    ) -> None:
-        t = len(parent[0]) if parent else 0
-        states = self.moves.states[state]
-        modes = tuple(
-            (*(parent[c] if parent else ()), (s - 1) // 3 if s else FREE) for c, s in enumerate(states)
-        )
-        if any(modes[c] > modes[c + 1] for c in range(self.fingers - 1)):
-            return  # the fingers are interchangeable
-        bound = forces + smooth + float(self.windows[t, states].sum() + self.to_go[t, state])
-        self._push(bound, Prefix(modes, state, forces))
-
-    def _expand(self, bound: float, node: Prefix) -> None:
-        """Settle the prefix's true smoothing cost; if it is still the least, branch to the next step."""
-        t = len(node.modes[0]) - 1
-        smooth = sum(self._least_smoothing(modes) for modes in node.modes)
-        settled = max(bound, node.forces + smooth + self.to_go[t, node.state])
-        if not node.settled and settled > bound * (1 + 1e-9) + 1e-12:
-            return self._push(settled, Prefix(node.modes, node.state, node.forces, settled=True))
-        self.nodes += 1
-        if t == self.model.steps - 1:
-            return self._plant(settled, node)
-        for k in reversed(range(self.moves.start[node.state], self.moves.start[node.state + 1])):
-            forces = node.forces + float(self.phi[t, self.moves.active[k]])
-            self._push_prefix(node.modes, int(self.moves.follow[k]), forces, smooth)
-        return None
-
-    def _least_smoothing(self, modes: tuple[int, ...]) -> float:
-        """Least smoothing cost of one finger's modes, free positions outside the object: a small search over regions."""
-        if modes not in self.smoothing:
-            column = np.array(modes)[:, None]
-            self.smoothing[modes] = self._outside(column, np.full_like(column, -1), np.inf)
-        return self.smoothing[modes]
-
-    def _outside(self, column: IntArray, assigned: IntArray, limit: float) -> float:
-        bound, t = least_smoothing(self.model, column, assigned)
-        if t < 0 or bound >= limit:
-            return bound
-        least = limit
-        for region in range(self.model.region.shape[1]):
-            assigned[t, 0] = region
-            least = min(least, max(bound, self._outside(column, assigned, least)))
-        assigned[t, 0] = -1
-        return least
-
-    # complete sequences
-
-    def _plant(self, bound: float, node: Prefix) -> None:
-        """Visit a complete sequence with its box narrowed to where every step can be balanced, if there is such a box."""
-        sequence = sequence_of(self.model, np.array(node.modes).T.copy())
-        lo, hi = sequence.lo.copy(), sequence.hi.copy()
-        if narrow(self.model, sequence, lo, hi):
-            self._visit(bound, Leaf(sequence, lo, hi, np.full_like(sequence.modes, -1)))
 
     def _visit(self, bound: float, leaf: Leaf) -> None:
         """Bound the box; keep the best plan; split where the relaxation is loosest."""
@@ -230,3 +169,82 @@ class Search:
             least_smoothing(self.model, modes[:, c : c + 1].copy(), assigned[:, c : c + 1].copy())[0]
             for c in range(self.fingers)
         )
+
+
+class Search(Tree):
+    """The tree of all mode sequences, grown from prefixes, and its tables for one task."""
+
+    def __init__(self, model: Model, fingers: int, gap: float) -> None:
+        super().__init__(model, fingers, gap)
+        self.moves: Moves = moves_of(model.facets, fingers, model.min_interval)
+        self.phi = step_costs(model, fingers)
+        self.windows = window_costs(model)
+        self.to_go = cost_to_go(self.phi, self.windows, self.moves, last_costs(model, self.phi, self.moves))
+        self.smoothing: dict[tuple[int, ...], float] = {}
+
+    def run(self, *, node_limit: int | None, deadline: float) -> Outcome:
+        """Search until the gap closes, the tree is empty or a budget is spent."""
+        states = self.moves.states
+        starts = np.flatnonzero(((states == 0) | (states % 3 == 1)).all(axis=1))  # free, or just arrived
+        for s in reversed(starts):  # of equals the last is expanded first: fingers without use stay free
+            self._push_prefix((), int(s), 0.0, 0.0)
+        return super().run(node_limit=node_limit, deadline=deadline)
+
+    def _open(self, bound: float, node: Prefix | Leaf) -> None:
+        if isinstance(node, Prefix):
+            self._expand(bound, node)
+        else:
+            self._visit(bound, node)
+
+    def _push_prefix(
+        self, parent: tuple[tuple[int, ...], ...], state: int, forces: float, smooth: float
+    ) -> None:
+        t = len(parent[0]) if parent else 0
+        states = self.moves.states[state]
+        modes = tuple(
+            (*(parent[c] if parent else ()), (s - 1) // 3 if s else FREE) for c, s in enumerate(states)
+        )
+        if any(modes[c] > modes[c + 1] for c in range(self.fingers - 1)):
+            return  # the fingers are interchangeable
+        bound = forces + smooth + float(self.windows[t, states].sum() + self.to_go[t, state])
+        self._push(bound, Prefix(modes, state, forces))
+
+    def _expand(self, bound: float, node: Prefix) -> None:
+        """Settle the prefix's true smoothing cost; if it is still the least, branch to the next step."""
+        t = len(node.modes[0]) - 1
+        smooth = sum(self._least_smoothing(modes) for modes in node.modes)
+        settled = max(bound, node.forces + smooth + self.to_go[t, node.state])
+        if not node.settled and settled > bound * (1 + 1e-9) + 1e-12:
+            return self._push(settled, Prefix(node.modes, node.state, node.forces, settled=True))
+        self.nodes += 1
+        if t == self.model.steps - 1:
+            return self._plant(settled, node)
+        for k in reversed(range(self.moves.start[node.state], self.moves.start[node.state + 1])):
+            forces = node.forces + float(self.phi[t, self.moves.active[k]])
+            self._push_prefix(node.modes, int(self.moves.follow[k]), forces, smooth)
+        return None
+
+    def _least_smoothing(self, modes: tuple[int, ...]) -> float:
+        """Least smoothing cost of one finger's modes, free positions outside the object: a small search over regions."""
+        if modes not in self.smoothing:
+            column = np.array(modes)[:, None]
+            self.smoothing[modes] = self._outside(column, np.full_like(column, -1), np.inf)
+        return self.smoothing[modes]
+
+    def _outside(self, column: IntArray, assigned: IntArray, limit: float) -> float:
+        bound, t = least_smoothing(self.model, column, assigned)
+        if t < 0 or bound >= limit:
+            return bound
+        least = limit
+        for region in range(self.model.region.shape[1]):
+            assigned[t, 0] = region
+            least = min(least, max(bound, self._outside(column, assigned, least)))
+        assigned[t, 0] = -1
+        return least
+
+    def _plant(self, bound: float, node: Prefix) -> None:
+        """Visit a complete sequence with its box narrowed to where every step can be balanced, if there is such a box."""
+        sequence = sequence_of(self.model, np.array(node.modes).T.copy())
+        lo, hi = sequence.lo.copy(), sequence.hi.copy()
+        if narrow(self.model, sequence, lo, hi):
+            self._visit(bound, Leaf(sequence, lo, hi, np.full_like(sequence.modes, -1)))
