@@ -146,4 +146,4 @@ def fit(
 def _damped_step(matrix: Array, gradient: Array, damping: float) -> Array:
     diagonal = np.diag(matrix)
     floor = 1e-6 * diagonal.mean() + 1e-12
-    return -np.linalg.solve(matrix + np.diag(damping * diagonal + floor), gradient)
+    return np.asarray(-np.linalg.solve(matrix + np.diag(damping * diagonal + floor), gradient))

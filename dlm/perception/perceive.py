@@ -4,6 +4,7 @@ import numpy as np
 
 from datasets.render import Camera, Frames
 from dlm.perception.appearance import Appearance, separate
+from dlm.perception.contacts import snap_contacts
 from dlm.perception.fit import Observation, Scene
 from dlm.perception.prune import boundary_variance, prune
 from dlm.perception.segment import Windows, segment
@@ -27,6 +28,8 @@ def perceive(
     windows = segment(look)
     seen = _observation(look, windows, settings)
     scene, _ = prune(first_scene(seen, settings.most_vertices), seen)
+    if settings.floor:
+        scene, _ = snap_contacts(scene, seen, camera.below / camera.scale, settings.snap)
     return _answer(scene, seen, camera, look)
 
 
