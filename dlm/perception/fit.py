@@ -33,8 +33,7 @@ class Scene:
 
     def placed(self) -> Array:
         """Vertices at all steps, (T, V, 2) [pixels]."""
-        arms = (self.vertices - self.centre) @ np.swapaxes(rotation(self.motion[:, 2]), -1, -2)
-        return self.centre + self.motion[:, None, :2] + arms
+        return _place(self.vertices, self.motion, self.centre)
 
     def moved(self, step: Array) -> "Scene":
         """By parameters in the order of `derivative`."""
@@ -56,6 +55,18 @@ class Scene:
             out[t, :, 0, k], out[t, :, 1, k + 1] = 1, 1
             out[t, :, 0, k + 2], out[t, :, 1, k + 2] = -arms[t, :, 1], arms[t, :, 0]
         return np.delete(out, np.s_[2 * count : 2 * count + 3], axis=-1)
+
+
+@numba.njit(cache=True)
+def _place(vertices: Array, motion: Array, centre: Array) -> Array:
+    placed = np.empty((len(motion), len(vertices), 2))
+    for t in range(len(motion)):
+        c, s = np.cos(motion[t, 2]), np.sin(motion[t, 2])
+        for k in range(len(vertices)):
+            x, y = vertices[k, 0] - centre[0], vertices[k, 1] - centre[1]
+            placed[t, k, 0] = centre[0] + motion[t, 0] + c * x - s * y
+            placed[t, k, 1] = centre[1] + motion[t, 1] + s * x + c * y
+    return placed
 
 
 @dataclass(frozen=True)
@@ -80,19 +91,16 @@ def modelled(scene: Scene, seen: Observation) -> tuple[Array, Array]:
 def quadratic(scene: Scene, seen: Observation) -> Quadratic:
     """The cost around a scene."""
     share, gradient = modelled(scene, seen)
-    steps, count = len(scene.motion), scene.vertices.size
-    cost, slope, square = _normal_equations(
-        share - seen.share, seen.weight, gradient.reshape(*share.shape, count)
-    )
-    chain = scene.derivative().reshape(steps, count, -1)
-    back = np.swapaxes(chain, -1, -2)
-    return Quadratic(cost, (back @ slope[..., None])[..., 0].sum(axis=0), (back @ square @ chain).sum(axis=0))
+    cost, slope, square = _normal_equations(share - seen.share, seen.weight, gradient)
+    return Quadratic(cost, *_chain(slope, square, scene.vertices - scene.centre, scene.motion[:, 2]))
 
 
 @numba.njit(cache=True)
 def _normal_equations(error: Array, weight: Array, gradient: Array) -> tuple[float, Array, Array]:
     """Cost, gradient (T, n) and matrix (T, n, n) with respect to the placed vertices; most entries per pixel are zero."""
-    steps, height, width, count = gradient.shape
+    steps, height, width = error.shape
+    count = 2 * gradient.shape[3]
+    flat = gradient.reshape(steps, height, width, count)
     cost, slope, square = 0.0, np.zeros((steps, count)), np.zeros((steps, count, count))
     touched = np.empty(count, dtype=np.int64)
     for t in range(steps):
@@ -102,17 +110,43 @@ def _normal_equations(error: Array, weight: Array, gradient: Array) -> tuple[flo
                 cost += 0.5 * w * e * e
                 n = 0
                 for k in range(count):
-                    if gradient[t, j, i, k] != 0.0:
+                    if flat[t, j, i, k] != 0.0:
                         touched[n] = k
                         n += 1
                 for a in range(n):
                     u = touched[a]
-                    pull = w * gradient[t, j, i, u]
+                    pull = w * flat[t, j, i, u]
                     slope[t, u] += pull * e
                     for b in range(n):
-                        v = touched[b]
-                        square[t, u, v] += pull * gradient[t, j, i, v]
+                        square[t, u, touched[b]] += pull * flat[t, j, i, touched[b]]
     return cost, slope, square
+
+
+@numba.njit(cache=True)
+def _chain(slope: Array, square: Array, arms: Array, angles: Array) -> tuple[Array, Array]:
+    """From placed vertices to the parameters: vertices, then motion[1:]."""
+    steps, count = slope.shape
+    size = count + 3 * (steps - 1)
+    gradient, matrix = np.zeros(size), np.zeros((size, size))
+    for t in range(steps):
+        c, s = np.cos(angles[t]), np.sin(angles[t])
+        # Columns: the derivative of the placed vertices by their own parameters (2 entries each), and by the motion.
+        frame = np.zeros((count, count + 3))
+        for i in range(0, count, 2):
+            x, y = arms[i // 2]
+            frame[i, i], frame[i, i + 1], frame[i + 1, i], frame[i + 1, i + 1] = c, -s, s, c
+            frame[i, count], frame[i + 1, count + 1] = 1.0, 1.0
+            frame[i, count + 2], frame[i + 1, count + 2] = -s * x - c * y, c * x - s * y
+        local = frame.T @ square[t] @ frame
+        pull = frame.T @ slope[t]
+        offset = 3 * (t - 1)  # parameter `count` of the frame is `count + offset` of all
+        shown = count + 3 if t > 0 else count
+        for a in range(shown):
+            u = a if a < count else a + offset
+            gradient[u] += pull[a]
+            for b in range(shown):
+                matrix[u, b if b < count else b + offset] += local[a, b]
+    return gradient, matrix
 
 
 def fit(

@@ -74,13 +74,13 @@ def _harmonics(share: Array, centre: Array) -> Array:
 
 def _turns(before: Array, after: Array) -> Array:
     """Angles at which the correlation of two spectra peaks, the highest first."""
-    angles = 2 * np.pi * np.arange(ANGLES) / ANGLES
-    k = np.arange(1, HARMONICS + 1)
-    match = (np.exp(1j * np.outer(angles, k)) @ (after * np.conj(before))).real
+    spectrum = np.zeros(ANGLES, dtype=complex)
+    spectrum[1 : HARMONICS + 1] = after * np.conj(before)
+    match = np.fft.ifft(spectrum).real
     peak = (match >= np.roll(match, 1)) & (match > np.roll(match, -1))
     peaks = np.flatnonzero(peak)
     best = peaks[np.argsort(match[peaks])[::-1]]
-    return angles[best[match[best] > 0.6 * match.max()]][:RIVALS]
+    return 2 * np.pi / ANGLES * best[match[best] > 0.6 * match.max()][:RIVALS]
 
 
 def _turned(scene: Scene, seen: Observation, t: int, turns: Array) -> Scene:
