@@ -1,0 +1,140 @@
+"""The goal cell: one facet per finger, whose lines bound the free space about the goal at every orientation.
+
+At orientation t finger n keeps the object's reference x in the half-plane  (R n) . x <= (R n) . p_n - d, n and d of its
+facet.  While the finger touches within the facet wherever that line bounds the cell, the cell is a whole component of
+free space; convex in each slice and, where its slices exist for an interval of t, connected with the goal: no dead end.
+
+f_k(t) = sum_n lambda_n ((R n) . p_n - d_n) >= 0 for all extreme rays lambda_k says that the slice at t exists.
+All conditions are linear in p.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from expert.geometry.pose import Array
+from expert.grasping.facets import Facets, rays
+from expert.grasping.rows import Rows
+
+LEAST_MOMENT = 0.02
+"""Moment (relative length) that each of the two rays must have at the end, in opposite senses."""
+
+
+@dataclass(frozen=True)
+class GoalCell:
+    """Facets of the fingers, sorted by normal angle, and which rays end the cell above (up) and below (down) the goal."""
+
+    table: Facets
+    chosen: tuple[int, ...]
+    up: int
+    down: int
+    margin: float
+
+    @property
+    def count(self) -> int:
+        """Number of fingers."""
+        return len(self.chosen)
+
+    @cached_property
+    def normals(self) -> Array:
+        """Facet normals (N, 2)."""
+        return self.table.normals[list(self.chosen)]
+
+    @cached_property
+    def offsets(self) -> Array:
+        """Facet offsets (N,)."""
+        return self.table.offsets[list(self.chosen)]
+
+    @cached_property
+    def rays(self) -> Array:
+        """Extreme rays (k, N)."""
+        return rays(self.normals)
+
+    @cached_property
+    def E(self) -> Array:
+        """sum lambda d of each ray (k,)."""
+        return self.rays @ self.offsets
+
+    def clearance(self) -> Rows:
+        """Goal clearance: n . p_n >= d, as rows that turn with the object."""
+        return Rows(np.eye(self.count)[:, :, None] * self.normals, self.offsets, np.full(self.count, np.inf))
+
+    def ray_rows(self, k: int, low: float, high: float) -> Rows:
+        """low <= f_k <= high."""
+        V = (self.rays[k][:, None] * self.normals)[None]
+        return Rows(V, np.array([low + self.E[k]]), np.array([high + self.E[k]]))
+
+    @cached_property
+    def contacts(self) -> Rows:
+        """Where the lines of neighbours meet, both touch within their facets, and all fingers stay in their wedges."""
+        pairs = self.table.neighbours(self.chosen)
+        corners = [self._corner(i, j) for i, j in pairs]
+        rows = []
+        for (i, j), (V, c) in zip(pairs, corners, strict=True):
+            rows += [self._on_facet(i, V, c), self._on_facet(j, *self._seen_from(j, i, V, c))]
+            rows += [self._in_wedge(n, *self._seen_from(n, i, V, c)) for n in range(self.count)]
+        return Rows.join(rows)
+
+    def _corner(self, i: int, j: int) -> tuple[Array, Array]:
+        """Contact of finger i, in the body frame, where lines i and j meet: y = c + sum_n A_n R' p_n with A (2, N, 2)."""
+        u, w = np.linalg.inv(self.normals[[i, j]]).T
+        constant = u * self.offsets[i] + w * self.offsets[j]
+        A = np.zeros((2, self.count, 2))
+        A[:, j] = -np.outer(w, self.normals[j])
+        A[:, i] = np.outer(w, self.normals[j])
+        return A, constant
+
+    def _seen_from(self, n: int, i: int, A: Array, constant: Array) -> tuple[Array, Array]:
+        """Where finger n is in the body frame when finger i is at the given point of it: y + R' (p_n - p_i)."""
+        moved = A.copy()
+        moved[:, n] += np.eye(2)
+        moved[:, i] -= np.eye(2)
+        return moved, constant
+
+    def _on_facet(self, n: int, A: Array, constant: Array) -> Rows:
+        facet = self.chosen[n]
+        along = self.table.tangents[facet]
+        V = np.einsum("d,dnx->nx", along, A)[None]
+        shift = along @ constant
+        low, high = self.table.low[facet] + self.margin, self.table.high[facet] - self.margin
+        return Rows(V, np.array([low - shift]), np.array([high - shift]))
+
+    def _in_wedge(self, n: int, A: Array, constant: Array) -> Rows:
+        wedge = self.table.wedges[self.chosen[n]]
+        if wedge is None:
+            return Rows(np.empty((0, self.count, 2)), np.empty(0), np.empty(0))
+        V = np.einsum("wd,dnx->wnx", wedge.A, A)
+        high = wedge.b - self.margin - wedge.A @ constant
+        return Rows(V, np.full(len(high), -np.inf), high)
+
+    def knot(self, reach: float, limit: float) -> Rows:
+        """Conditions at a knot before the last: on arrival the object is within +-reach, on departure within +-limit."""
+        eps = self.margin * min(1.0, np.sin(limit) / np.sin(np.radians(3)))
+        parts = [self.contacts.over(-reach, reach), _raised(self.clearance().at(0.0), eps)]
+        for k, side in ((self.up, 1.0), (self.down, -1.0)):
+            below = self.ray_rows(k, -np.inf, -eps)
+            falling = Rows(side * below.V, np.array([-np.inf]), np.array([0.0]))
+            parts += [below.at(side * limit), below.at(side * reach), falling.slope(side * limit)]
+        return Rows.join(parts)
+
+    def end(self, reach: float) -> Rows:
+        """Conditions at the last knot: all fingers touch at the goal, and the rays' moments hold it (form closure)."""
+        eps = self.margin * min(1.0, np.sin(reach) / np.sin(np.radians(3)))
+        touch = self.clearance().at(0.0)
+        parts = [self.contacts.over(-reach, reach), Rows(touch.V, touch.low, touch.low)]
+        for k, side in ((self.up, 1.0), (self.down, -1.0)):
+            below = self.ray_rows(k, -np.inf, -eps)
+            falling = Rows(side * below.V, np.array([-np.inf]), np.array([-LEAST_MOMENT]))
+            parts += [below.at(side * reach), falling.slope(0.0)]
+        return Rows.join(parts)
+
+    def slice(self, p: Array, angle: float = 0.0) -> tuple[Array, Array]:
+        """The cell at an orientation, {x : A x <= b}, for fingers p (N, 2)."""
+        c, s = np.cos(angle), np.sin(angle)
+        A = self.normals @ np.array([[c, s], [-s, c]])
+        return A, (A * p).sum(axis=1) - self.offsets
+
+
+def _raised(rows: Rows, by: float) -> Rows:
+    return Rows(rows.V, rows.low + by, rows.high)

@@ -1,0 +1,152 @@
+"""Facets of the object as fingers see them, and the tuples of facets that can hold it.  Relative lengths."""
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from expert.geometry.convex import Region
+from expert.geometry.polygon import facet_frames, facets
+from expert.geometry.pose import Array, cross
+
+PARALLEL = 1e-6
+"""Normals whose cross product is smaller have one direction."""
+
+
+@dataclass(frozen=True)
+class Facets:
+    """Outward normals n and tangents (V, 2), offsets d (n . y = d), ends low, high along the tangent, each (V,)."""
+
+    vertices: Array
+    normals: Array
+    tangents: Array
+    offsets: Array
+    low: Array
+    high: Array
+
+    @classmethod
+    def of(cls, vertices: Array) -> "Facets":
+        """Facets of a counter-clockwise polygon."""
+        inward, tangents = facet_frames(vertices)
+        a, b = facets(vertices)
+        return cls(
+            vertices,
+            -inward,
+            tangents,
+            -(inward * a).sum(axis=1),
+            (tangents * a).sum(axis=1),
+            (tangents * b).sum(axis=1),
+        )
+
+    def __len__(self) -> int:
+        return len(self.offsets)
+
+    @cached_property
+    def wedges(self) -> tuple[Region | None, ...]:
+        """Convex free region over each facet; None where all beyond its line is free."""
+        return tuple(_wedge(self, k) for k in range(len(self)))
+
+    def by_angle(self, chosen: tuple[int, ...]) -> tuple[int, ...]:
+        """The same facets in the order of their normals' angles."""
+        angle = np.arctan2(self.normals[:, 1], self.normals[:, 0])
+        return tuple(sorted(chosen, key=lambda k: (angle[k], k)))
+
+    def neighbours(self, chosen: tuple[int, ...]) -> list[tuple[int, int]]:
+        """Pairs of positions in `chosen` (sorted by angle) whose facet lines bound the cell next to each other.
+
+        Facets of one direction take turns in bounding it, so each of them neighbours all of the next direction.
+        """
+        groups: list[list[int]] = []
+        for k, facet in enumerate(chosen):
+            alike = groups and _same(self.normals[chosen[groups[-1][0]]], self.normals[facet])
+            if alike:
+                groups[-1].append(k)
+            else:
+                groups.append([k])
+        if len(groups) > 1 and _same(self.normals[chosen[groups[0][0]]], self.normals[chosen[groups[-1][0]]]):
+            groups[0] = groups.pop() + groups[0]
+        following = groups[1:] + groups[:1]
+        return [pair for a, b in zip(groups, following, strict=True) for pair in itertools.product(a, b)]
+
+
+def _same(u: Array, v: Array) -> bool:
+    return bool(abs(cross(u, v)) < PARALLEL and u @ v > 0)
+
+
+def rays(normals: Array) -> Array:
+    """Extreme rays (k, N), each of sum 1, of {lambda >= 0 : sum lambda n = 0}; normals (N, 2).
+
+    Two antiparallel normals, or three that positively span the plane.
+    """
+    count = len(normals)
+    found = []
+    for i, j in itertools.combinations(range(count), 2):
+        if _same(normals[i], -normals[j]):
+            found.append(_ray(count, (i, j), np.ones(2)))
+    for support in itertools.combinations(range(count), 3):
+        u, v, w = normals[list(support)]
+        weights = np.array([cross(v, w), cross(w, u), cross(u, v)])
+        if (weights > PARALLEL).all() or (weights < -PARALLEL).all():
+            found.append(_ray(count, support, weights))
+    return np.array(found).reshape(-1, count)
+
+
+def _ray(count: int, support: tuple[int, ...], weights: Array) -> Array:
+    ray = np.zeros(count)
+    ray[list(support)] = weights / weights.sum()
+    return ray
+
+
+def spans(normals: Array) -> bool:
+    """Whether the normals positively span the plane, with no gap of half a turn or more between neighbours."""
+    angles = np.sort(np.arctan2(normals[:, 1], normals[:, 0]))
+    gaps = np.diff(np.append(angles, angles[0] + 2 * np.pi))
+    return bool(gaps.max() < np.pi - PARALLEL)
+
+
+def tuples(table: Facets, count: int) -> Iterator[tuple[int, ...]]:
+    """Facets that `count` fingers can hold the object by, two fingers on a facet at most, sorted by normal angle."""
+    for chosen in itertools.combinations_with_replacement(range(len(table)), count):
+        most = max(chosen.count(k) for k in chosen)
+        if most <= 2 and spans(table.normals[list(chosen)]):
+            yield table.by_angle(chosen)
+
+
+def _wedge(table: Facets, k: int) -> Region | None:
+    """Half-planes beyond facets, the fewest that keep the region over facet k free of the object."""
+    polygon = shapely.Polygon(table.vertices)
+    size = 4 * float(np.abs(table.vertices).max())
+    region = _beyond(table, k, size)
+    chosen: list[int] = []
+    area = 1e-9 * polygon.area
+    while region.intersection(polygon).area > area:
+        best = max(
+            (j for j in range(len(table)) if j != k and j not in chosen),
+            key=lambda j: _merit(region.intersection(_beyond(table, j, size)), polygon, table, k),
+        )
+        smaller = region.intersection(_beyond(table, best, size))
+        if smaller.area >= region.area - area:
+            return Region(
+                np.zeros((1, 2)), np.array([-1.0])
+            )  # nothing separates: no finger may use this facet
+        region = smaller
+        chosen.append(best)
+    if not chosen:
+        return None
+    return Region(-table.normals[chosen], -table.offsets[chosen])
+
+
+def _merit(region: shapely.Polygon, polygon: shapely.Polygon, table: Facets, k: int) -> tuple[float, float]:
+    """How much of facet k remains next to the region, then how little of the object."""
+    a, b = facets(table.vertices)
+    kept = region.buffer(1e-9).intersection(shapely.LineString([a[k], b[k]])).length
+    whole = float(np.linalg.norm(b[k] - a[k]))
+    return round(min(kept / whole, 1.0), 2), -region.intersection(polygon).area
+
+
+def _beyond(table: Facets, k: int, size: float) -> shapely.Polygon:
+    foot, n, t = table.offsets[k] * table.normals[k], table.normals[k], table.tangents[k]
+    return shapely.Polygon([foot - size * t, foot + size * t, foot + size * (t + n), foot - size * (t - n)])
