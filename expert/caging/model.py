@@ -17,9 +17,10 @@ from typing import Literal
 
 import numpy as np
 
+from expert.caging.solution import Meeting
 from expert.caging.swept import REACH, SweptGeometry
 from expert.geometry.pose import Array, rotation
-from expert.mip.backends import Answer, Solver
+from expert.mip.backends import Solver, Status
 from expert.mip.linear import LinearModel, Term
 from expert.types import IntArray
 
@@ -38,6 +39,15 @@ class Element:
     finger: int | None = None
     ends: Array | None = None
     joined: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Proposal:
+    """A model's answer before anyone has verified it: relative fingers (count, 2), None without any, and the loop."""
+
+    status: Status
+    fingers: Array | None = None
+    meetings: tuple[Meeting, ...] = ()
 
 
 Part = Literal["entry", "exit", "both"]
@@ -74,6 +84,7 @@ class SweptModel:
         self.geometry, self.ring, self.limits = geometry, tuple(ring), limits
         self.count = len(ring)
         self.milp = LinearModel()
+        self._found = np.empty(0)
         self.p = self.milp.add((self.count, 2), -REACH, REACH)
         self.overlaps = geometry.overlaps(*limits)
         only = np.eye(len(geometry.pieces), dtype=bool) if one_piece else True
@@ -185,11 +196,24 @@ class SweptModel:
         first = np.broadcast_to(self.p[0, 0], (len(others),))
         self.milp.at_most([(1.0, first), (-1.0, self.p[list(others), 0])], np.zeros(len(others)))
 
-    def solve(self, solver: Solver, time_limit: float) -> Answer:
-        """An answer's x holds the positions at `p` and the binaries at `R` and `H`."""
-        return self.milp.solve(solver, time_limit=time_limit)
+    def propose(self, solver: Solver, time_limit: float) -> Proposal:
+        """Searched fingers in the order of their indices, and how the loop passes along the ring."""
+        answer = self.milp.solve(solver, time_limit=time_limit)
+        if answer.x is None:
+            return Proposal(status=answer.status)
+        self._found = answer.x
+        searched = sum(element.finger is not None for element in self.ring)
+        fingers = np.array([answer.x[self.finger(k)] for k in range(searched)]).reshape(-1, 2)
+        return Proposal(status=answer.status, fingers=fingers, meetings=self._meetings(answer.x))
 
-    def cut(self, x: Array) -> None:
-        """Never again this choice of regions and meetings."""
-        on = np.concatenate([v.ravel()[x[v.ravel()] > 0.5] for v in (self.R, self.H)])
+    def _meetings(self, x: Array) -> tuple[Meeting, ...]:
+        keys = list(self.overlaps)
+        return tuple(
+            Meeting(element=n, piece=keys[k][0], next_element=(n + 1) % self.count, next_piece=keys[k][1])
+            for n, k in enumerate(x[self.H].argmax(axis=1))
+        )
+
+    def cut_off(self) -> None:
+        """Never again the last proposal's regions and meetings."""
+        on = np.concatenate([v.ravel()[self._found[v.ravel()] > 0.5] for v in (self.R, self.H)])
         self.milp.at_most([(1.0, on)], len(on) - 1.0)

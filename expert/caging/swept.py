@@ -80,11 +80,12 @@ class SweptGeometry:
     @cached_property
     def regions(self) -> list[Region]:
         """Convex regions for fingers; those with facets of the object as bounds keep clear of them."""
-        cleared = [self._cleared(region) for region in free_regions(self.vertices)]
+        cleared = [self.cleared(region) for region in free_regions(self.vertices)]
         square = REACH * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
         return [r for r in cleared if _has_area(clip(square, r.A, r.b))]
 
-    def _cleared(self, region: Region) -> Region:
+    def cleared(self, region: Region) -> Region:
+        """A free region without the strip along the object's facets that the clearance takes."""
         inward, _ = facet_frames(self.vertices)
         offsets = (inward * facets(self.vertices)[0]).sum(axis=1)
         same = (np.abs(region.A[:, None] - inward[None]).max(axis=2) < 1e-9) & (

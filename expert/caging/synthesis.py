@@ -19,19 +19,23 @@ from expert.caging.problem import Arrangement, CageProblem
 from expert.caging.requirements import objective, require
 from expert.caging.solution import CageSolution, Meeting
 from expert.caging.swept import SweptGeometry
+from expert.caging.thesis import ThesisModel, slices
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, to_world
 from expert.mip.backends import Solver
 from expert.verify.cage import CageReport, verify_cage
 
-Method = Literal["swept", "model"]
-"""swept: the model, and immobilising grasps where it is slow; model: the model alone."""
+Method = Literal["swept", "model", "thesis"]
+"""swept: the model, and immobilising grasps where it is slow; model: the model alone; thesis: MIP1."""
 LADDER = tuple((np.radians(a), np.radians(b)) for a, b in (
     (15, 15), (20, 20), (30, 30), (10, 10), (5, 5), (45, 45), (7, 7),
     (5, 25), (25, 5), (10, 40), (40, 10), (3, 3), (60, 60),
 ))  # fmt: skip
 TIGHT = np.radians(20)
 """Restricted fingers leave less room: the ladder begins with ranges of about this width."""
+THESIS_LADDER = ((np.radians(40), np.radians(40)), (np.radians(90), np.radians(90)))
+THESIS_SLICES = 9
+"""Slices of MIP1, as many as in Thesis 5.1.7."""
 QUICK = 3
 """Ranges of the ladder that the quick part tries."""
 MOST_CUTS = 5
@@ -66,6 +70,11 @@ class Tally:
         """Time that is left [s]."""
         return self.deadline - time.perf_counter()
 
+    @property
+    def done(self) -> bool:
+        """Whether a better answer cannot be found: there is one, and no cost."""
+        return self.best.found and self.problem.cost == "none"
+
     def judge(self, fingers: Array) -> CageReport | None:
         """Verify a model's fingers (count, 2) [m] and count.  None where they do not even fit beside the object."""
         try:
@@ -99,7 +108,8 @@ def solve(
 ) -> CageSolution:
     """A verified cage, the best found within time_limit [s] where there is a cost (Thesis 5.1, reformulated).
 
-    Raises InvalidProblem for an arrangement whose fingers are given: there is nothing to solve.
+    Raises InvalidProblem for an arrangement whose fingers are given: there is nothing to solve; and for a problem that
+    MIP1 (method thesis) does not know: walls, fixed fingers, grippers, costs.
     """
     if isinstance(problem, Arrangement):
         raise InvalidProblem(
@@ -107,14 +117,42 @@ def solve(
         )
     began = time.perf_counter()
     tally = Tally(problem, began + time_limit)
-    for attempt in _attempts(problem, method):
-        if tally.left <= 0 or (tally.best.found and problem.cost == "none"):
-            break
+    if method == "thesis":
+        _search_slices(tally, solver)
+    else:
+        _search_ranges(tally, method, solver)
+    return _answer(tally, time.perf_counter() - began)
+
+
+def _search_slices(tally: Tally, solver: Solver) -> None:
+    """MIP1 for one choice of slices after the other."""
+    problem = tally.problem
+    if len(problem.fixed) or len(problem.walls) or problem.grippers or problem.cost != "none":
+        extras = "fixed fingers, walls, grippers or a cost"
+        raise InvalidProblem("options.method", expected="swept where the problem has " + extras, got="thesis")
+    frame = Frame.of(problem.shape, problem.pose)
+    for below, above in problem.rotation or THESIS_LADDER:
+        if tally.left <= 0 or tally.best.found:
+            return
+        angles = slices(below, above, THESIS_SLICES)
+        model = ThesisModel(
+            frame.body(problem.shape.vertices),
+            problem.margin * problem.shape.size / frame.radius,
+            angles,
+            problem.count,
+        )
+        _search(tally, model, frame, tally.left, solver)
+
+
+def _search_ranges(tally: Tally, method: Method, solver: Solver) -> None:
+    """Swept models, and grasps, for one range of rotation after the other."""
+    for attempt in _attempts(tally.problem, method):
+        if tally.left <= 0 or tally.done:
+            return
         if attempt is None:
             _try_grasps(tally)
         else:
             _try_models(tally, attempt, solver)
-    return _answer(tally, time.perf_counter() - began)
 
 
 def _answer(tally: Tally, seconds: float) -> CageSolution:
@@ -178,7 +216,7 @@ def _try_models(tally: Tally, attempt: Attempt, solver: Solver) -> None:
     for ring in rings(problem, frame):
         alike = len(ring) == problem.count and not _labelled(problem)
         for hubs in _hubs(len(ring), alike):
-            if tally.left <= 0 or (tally.best.found and problem.cost == "none"):
+            if tally.left <= 0 or tally.done:
                 return
             model = SweptModel(
                 geometry, ring, (-attempt.below, attempt.above), hubs=hubs, one_piece=attempt.one_piece
@@ -187,33 +225,25 @@ def _try_models(tally: Tally, attempt: Attempt, solver: Solver) -> None:
                 continue
             _break_symmetry(model, problem)
             require(model, problem, frame, solver)
-            _search(tally, model, frame, min(attempt.seconds, tally.left), solver)
+            _search(tally, model, frame, attempt.seconds, solver)
 
 
-def _search(tally: Tally, model: SweptModel, frame: Frame, seconds: float, solver: Solver) -> None:
+def _search(
+    tally: Tally, model: SweptModel | ThesisModel, frame: Frame, seconds: float, solver: Solver
+) -> None:
+    """Verify what the model proposes, and cut off what is refuted."""
     for _ in range(MOST_CUTS):
         tally.attempts += 1
-        answer = model.solve(solver, max(seconds, 0.01))
-        if answer.x is None:
-            tally.undecided |= answer.status != "infeasible"
+        proposal = model.propose(solver, max(min(seconds, tally.left), 0.01))
+        if proposal.fingers is None:
+            tally.undecided |= proposal.status != "infeasible"
             return
-        fingers = frame.world(
-            np.array([answer.x[model.finger(k)] for k in range(tally.problem.count)]).reshape(-1, 2)
-        )
+        fingers = frame.world(proposal.fingers)
         report = tally.judge(fingers)
         if report is not None and report.verdict == "caged":
-            tally.keep(fingers, report, _topology(model, answer.x))
+            tally.keep(fingers, report, proposal.meetings)
             return
-        model.cut(answer.x)
-
-
-def _topology(model: SweptModel, x: Array) -> tuple[Meeting, ...]:
-    keys, count = list(model.overlaps), len(model.ring)
-    chosen = x[model.H].argmax(axis=1)
-    return tuple(
-        Meeting(element=n, piece=keys[k][0], next_element=(n + 1) % count, next_piece=keys[k][1])
-        for n, k in enumerate(chosen)
-    )
+        model.cut_off()
 
 
 def rings(problem: CageProblem, frame: Frame) -> Iterator[list[Element]]:

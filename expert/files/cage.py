@@ -13,7 +13,7 @@ from expert.geometry.pose import Array
 if TYPE_CHECKING:
     from expert.files import Problem
 
-METHODS = ("swept", "model")
+METHODS = ("swept", "model", "thesis")
 SOLVERS = ("highs", "scip")
 COSTS = ("none", "min_separation", "max_opening")
 STATUSES: tuple[CageStatus, ...] = ("caged", "none_found", "time_limit")
