@@ -24,7 +24,7 @@ from expert.files import problem_of, read_problem, solution_of, write_solution
 from expert.files.document import load, save, writable
 
 SOLVED, REFUTED, BAD_INPUT, INFEASIBLE, UNKNOWN, INTERRUPTED = 0, 1, 2, 3, 4, 130
-VERDICTS = {"sound": SOLVED, "caged": SOLVED, "refuted": REFUTED, "escapes": REFUTED}
+VERDICTS = {"sound": SOLVED, "caged": SOLVED, "certified": SOLVED, "refuted": REFUTED, "escapes": REFUTED}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

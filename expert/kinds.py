@@ -25,7 +25,7 @@ class Report(Protocol):
 
     @property
     def verdict(self) -> str:
-        """sound, caged, refuted, escapes or unknown."""
+        """sound, caged, certified, refuted, escapes or unknown."""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON values, the certificate."""
