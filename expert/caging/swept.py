@@ -72,7 +72,7 @@ class SweptGeometry:
         """Non-empty K_ij over [low, high], eroded, as {x : A x <= b}."""
         sets = {}
         for key, polygon in self.differences.items():
-            swept = _swept_inside(polygon, low, high, self.clearance)
+            swept = swept_inside(polygon, low, high, self.clearance)
             if _has_area(swept):
                 sets[key] = half_planes(_simplified(_cleaned(swept)))
         return sets
@@ -133,7 +133,7 @@ def swept_steps(low: float, high: float) -> list[tuple[float, float]]:
     return [(low + (2 * k + 1) * half, half) for k in range(count)]
 
 
-def _swept_inside(polygon: Array, low: float, high: float, clearance: float) -> Array:
+def swept_inside(polygon: Array, low: float, high: float, clearance: float) -> Array:
     """Convex polygon inside R(t) polygon for all t in [low, high], eroded.
 
     {y : n . y <= d} holds while it turns by up to h either way if it holds turned by +-h and, for d > 0, with the chord
