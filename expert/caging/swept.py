@@ -58,7 +58,7 @@ class SweptGeometry:
         overlap = clip(self.pieces[j], A, b)
         if not _has_area(overlap):
             return np.empty((0, 2)), np.empty(0)
-        A, b = half_planes(_cleaned(overlap))
+        A, b = half_planes(cleaned(overlap))
         inner = clip(overlap, A, b - self.clearance)
         return (A, b - self.clearance) if _has_area(inner) else (np.empty((0, 2)), np.empty(0))
 
@@ -74,7 +74,7 @@ class SweptGeometry:
         for key, polygon in self.differences.items():
             swept = swept_inside(polygon, low, high, self.clearance)
             if _has_area(swept):
-                sets[key] = half_planes(_simplified(_cleaned(swept)))
+                sets[key] = half_planes(_simplified(cleaned(swept)))
         return sets
 
     @cached_property
@@ -160,7 +160,7 @@ def _minkowski(a: Array, b: Array) -> Array:
 
 def _separating(free: Array, piece: Array) -> Array:
     """Unit normal u with the widest gap min u . free - max u . piece; an edge normal of one of the two polygons."""
-    candidates = np.concatenate([-half_planes(_cleaned(free))[0], half_planes(piece)[0]])
+    candidates = np.concatenate([-half_planes(cleaned(free))[0], half_planes(piece)[0]])
     gaps = (free @ candidates.T).min(axis=0) - (piece @ candidates.T).max(axis=0)
     return candidates[int(gaps.argmax())]
 
@@ -169,7 +169,7 @@ def _has_area(polygon: Array) -> bool:
     return len(polygon) >= 3 and shapely.Polygon(polygon).area > 1e-9
 
 
-def _cleaned(polygon: Array) -> Array:
+def cleaned(polygon: Array) -> Array:
     """Without corners closer than 1e-7 to the next and without straight ones."""
     ahead = np.roll(polygon, -1, axis=0) - polygon
     return polygon[np.linalg.norm(ahead, axis=1) > 1e-7]
