@@ -5,8 +5,7 @@ position and force (`expert.contact.leaf`).  One compiled pass bounds all propos
 it leaves open; a polish ends at the point where the quadratic program 4-CT6 has its optimum too.
 """
 
-from collections.abc import Sequence as Row
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -112,25 +111,3 @@ def _plan(task: ContactTask, model: Model, best: Best) -> Plan | None:
         contact_forces=reactions,
         residual=residual,
     )
-
-
-def without_least_push(task: ContactTask) -> ContactTask:
-    """The same task for fingers that may push as little as they like: not every motion has a plan that always pushes."""
-    return replace(task, robustness=replace(task.robustness, min_normal_force=0.0))
-
-
-def first_plan(task: ContactTask, batches: Row[IntArray]) -> tuple[Plan | None, ContactTask, int]:
-    """The best plan of the first batch of mode sequences that has one, the task it solves, and how many were checked.
-
-    All batches are tried with the task's least push before any is tried without.
-    """
-    checked = 0
-    pushes = [task] if task.robustness.min_normal_force == 0 else [task, without_least_push(task)]
-    for one in pushes:
-        model = model_of(one)
-        for modes in batches:
-            checked += len(modes)
-            found = check(one, modes, model=model) if len(modes) else None
-            if found is not None and found.plan is not None:
-                return found.plan, one, checked
-    return None, task, checked

@@ -67,7 +67,8 @@ class Schedules:
     @cached_property
     def single(self) -> Mask:
         """(schedule,): only one finger ever touches."""
-        return ~self.touching.any(axis=1).all(axis=1)
+        first, second = np.moveaxis(np.array(self.touching.any(axis=1)), 1, 0)
+        return first != second
 
     def classes(self, facets: int) -> IntArray:
         """All classes of an object with so many facets, (k, 3)."""

@@ -1,0 +1,100 @@
+"""`model: structured`: video to geometry, geometry to contact classes, classes to a checked plan."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import torch
+
+from datasets.parameters import MechanicalParameters, parameters_of
+from datasets.render import Camera, Frames
+from dlm.inverse_dynamics import Action
+from dlm.perception import Perceived, PerceptionSettings, perceive
+from dlm.structured.planners import Answer, ClassPlanner, Planner
+from dlm.structured.planning import Planning
+from expert.errors import InvalidProblem, SolverFailed
+from expert.types import ContactTask, Plan
+
+Status = Literal["planned", "poor_fit", "no_plan"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Planned:
+    """Answer to a video.
+
+    status: planned; poor_fit (there is a plan, but the video is not explained by what was perceived); no_plan (none was
+    found, which does not prove that there is none).  reason: in words.  task: what was planned for, None where the
+    geometry makes no task.  checked: contact classes looked at.
+    """
+
+    perceived: Perceived
+    status: Status
+    reason: str = ""
+    plan: Plan | None = None
+    task: ContactTask | None = None
+    checked: int = 0
+
+    @property
+    def parameters(self) -> MechanicalParameters | None:
+        """P(t) at which 4-CT6 has the plan as its optimum; None where there is no plan."""
+        return (
+            parameters_of(self.task, self.plan) if self.plan is not None and self.task is not None else None
+        )
+
+    def action(self) -> Action:
+        """As a batch of one; zeros and solved = False where there is no plan."""
+        shape = (len(self.perceived.poses), 2, 2)
+        found = self.plan is not None
+        arrays = (self.plan.positions, self.plan.forces) if self.plan is not None else (np.zeros(shape),) * 2
+        positions, forces = (torch.from_numpy(np.array(a, dtype=float))[None] for a in arrays)
+        return Action(
+            positions=positions,
+            forces=forces,
+            slack=torch.zeros(1, shape[0], 3, dtype=torch.float64),
+            solved=torch.tensor([found]),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class StructuredModel:
+    """camera and perception: of `dlm.perception.perceive`; planning: margins; planner: how a plan is found."""
+
+    camera: Camera = field(default_factory=Camera)
+    perception: PerceptionSettings = field(default_factory=PerceptionSettings)
+    planning: Planning = field(default_factory=Planning)
+    planner: Planner = field(default_factory=ClassPlanner)
+
+    def act(self, video: Frames) -> Planned:
+        """Perceive and plan.  Raises InvalidProblem for a video without one object that stays in view."""
+        return self.plan(perceive(video, self.camera, self.perception))
+
+    def plan(self, perceived: Perceived) -> Planned:
+        """Plan for perceived geometry.  Raises InvalidProblem for another number of frames than planned for."""
+        checked, task = 0, None
+        for planning in self.planning.relaxed():
+            try:
+                task = planning.of(perceived)
+                answer = self.planner(task)
+            except InvalidProblem as error:
+                if error.field == "poses":
+                    raise
+                return Planned(perceived=perceived, status="no_plan", reason=str(error), checked=checked)
+            except SolverFailed as error:
+                return Planned(perceived=perceived, status="no_plan", reason=str(error), checked=checked)
+            checked += answer.checked
+            if answer.plan is not None:
+                return _planned(perceived, answer, checked)
+        reason = f"no plan among {checked} checked contact classes"
+        return Planned(perceived=perceived, status="no_plan", reason=reason, task=task, checked=checked)
+
+
+def _planned(perceived: Perceived, answer: Answer, checked: int) -> Planned:
+    doubt = perceived.status != "ok"
+    return Planned(
+        perceived=perceived,
+        status="poor_fit" if doubt else "planned",
+        reason=perceived.reason if doubt else "",
+        plan=answer.plan,
+        task=answer.task,
+        checked=checked,
+    )

@@ -1,0 +1,51 @@
+"""From perceived geometry to a contact task, with the margins that make up for what perception may have wrong."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from datasets.motions import Tasks
+from dlm.perception import Perceived
+from expert.geometry.pose import Array, to_world
+from expert.types import Body, ContactTask, Trajectory, require
+
+FACET_MARGIN = 0.2
+"""Share of a facet kept free at either end: perceived corners are off by a part of a pixel, and may be superfluous."""
+
+LESS_MARGIN = (0.1, 0.05)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Planning:
+    """What planning assumes beyond what is seen.
+
+    tasks: mass, friction, time step, fingers and margins; its facet_margin, cone_fraction and least_push are those planned with.
+    """
+
+    tasks: Tasks = field(default_factory=lambda: Tasks(facet_margin=FACET_MARGIN))
+
+    def task(self, vertices: Array, poses: Array) -> ContactTask:
+        """The task of moving a uniform object, vertices (V, 2) about its centroid, along poses (T, 3) over the floor y = 0.
+
+        Raises InvalidProblem for another number of poses, and for what makes no polygon.
+        """
+        steps = self.tasks.steps
+        require(len(poses) == steps, "poses", f"{steps}", len(poses), f"resample the video to {steps} frames")
+        body, centroid = Body.uniform(vertices, self.tasks.mass)
+        centred = np.column_stack([to_world(poses, centroid[None])[:, 0], poses[:, 2]])
+        depth = -to_world(centred, body.vertices)[..., 1].min(axis=1)
+        centred[:, 1] += np.maximum(depth, 0.0)
+        return self.tasks.task(body, Trajectory.of(centred, self.tasks.dt, "rest"))
+
+    def of(self, perceived: Perceived) -> ContactTask:
+        """The task that is seen."""
+        return self.task(perceived.vertices, perceived.poses)
+
+    def relaxed(self) -> Iterator["Planning"]:
+        """This planning, then with margins given up one after the other: not every motion has a plan that keeps them."""
+        own = self.tasks
+        margins = [m for m in (own.facet_margin, *LESS_MARGIN) if m <= own.facet_margin]
+        for facet_margin in dict.fromkeys(margins):
+            for least_push in dict.fromkeys((own.least_push, 0.0)):
+                yield replace(self, tasks=replace(own, facet_margin=facet_margin, least_push=least_push))
