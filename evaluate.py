@@ -1,10 +1,14 @@
-"""Compare the trained architectures: `python evaluate.py output=runs seeds=[0]` writes Table 4.1, curves and a report."""
+"""Compare the trained architectures: `python evaluate.py output=runs seeds=[0]` writes Table 4.1, figures 4-6 and 4-7, and a report.
+
+`python evaluate.py experiment=table_4_1` does so for the five seeds that `python train.py experiment=table_4_1` trains.
+"""
 
 import json
 import shlex
 import sys
 from pathlib import Path
 
+import torch
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 from rich.console import Console
@@ -12,6 +16,8 @@ from rich.console import Console
 from datasets.entry import entry_point
 from datasets.store import write_whole
 from dlm.checkpoint import About, load, restore_weights
+from dlm.evaluation.extras import read_extras
+from dlm.evaluation.report import png
 from dlm.evaluation.study import Study, Trained
 from dlm.models import Policy
 from dlm.tasks import read_all
@@ -25,7 +31,8 @@ STAGES = ("nn", "nnm", "mdr", "cvx", "dlm")
 def main(cfg: DictConfig) -> None:
     """Rebuild every policy from its checkpoint, execute its actions, write tables and report."""
     require(len(cfg.seeds) > 0, "seeds", "at least one seed", list(cfg.seeds), "seeds=[0]")
-    tasks = read_all(cfg.data)
+    torch.set_num_threads(1)
+    tasks, extras = read_all(cfg.data), read_extras(cfg.extras)
     study = Study(
         trained=[trained(cfg, name) for name in STAGES],
         tasks=tasks,
@@ -36,16 +43,19 @@ def main(cfg: DictConfig) -> None:
         status.update("timing")
         table = study.table(outcomes, origin(cfg, {name: batch.fingerprint for name, batch in tasks.items()}))
         status.update("drawing")
-        page = study.report(outcomes, table, cfg.examples)
+        report = study.report(outcomes, table, examples=cfg.examples, extras=extras)
+        page = report.html()
     folder = Path(cfg.output)
     files = {
-        "table_4_1.md": table.as_markdown(),
-        "table_4_1.csv": table.as_csv(),
-        "table_4_1.json": json.dumps(table.as_json(), indent=1),
-        "report.html": page,
+        "table_4_1.md": table.as_markdown().encode(),
+        "table_4_1.csv": table.as_csv().encode(),
+        "table_4_1.json": json.dumps(table.as_json(), indent=1).encode(),
+        "figure_4_6.png": png(report.curves),
+        "figure_4_7.png": png(report.qualitative),
+        "report.html": page.encode(),
     }
-    for name, text in files.items():
-        write_whole(folder / name, text.encode())
+    for name, data in files.items():
+        write_whole(folder / name, data)
     print(table.as_markdown())
     print(f"report: {(folder / 'report.html').resolve()}")
 

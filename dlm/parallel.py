@@ -22,7 +22,7 @@ def chains(stages: Sequence[Stage]) -> list[list[Stage]]:
     """Stages that start from one another's weights, in order; different chains do not wait for each other.  Longest first."""
     found: list[list[Stage]] = []
     for stage in stages:
-        before = [row for row in found if stage.warm_start in (earlier.name for earlier in row)]
+        before = [row for row in found if stage.warm_start in [earlier.name for earlier in row]]
         if before:
             before[0].append(stage)
         else:

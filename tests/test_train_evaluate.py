@@ -134,8 +134,8 @@ def test_the_report_opens_in_a_browser(results: Path, tmp_path: Path) -> None:
     assert "CONSOLE" not in answer.stderr
     models = 6
     assert answer.stdout.count("<svg ") == 2 * models  # an example of the family and one of the test set
-    assert answer.stdout.count("<img ") == 1 + 2 * 2  # curves; video and strip of each example
-    assert answer.stdout.count("<table>") >= 7
+    assert answer.stdout.count("<img ") == 2 + 2 * 2  # curves, whole motions; video and strip of each example
+    assert answer.stdout.count("<table") == 1 + 6 + 4 + 1  # Table 4.1, its details, tests by data set, origin
     assert answer.stdout.rstrip().endswith("</html>")
 
 

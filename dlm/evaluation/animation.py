@@ -58,12 +58,12 @@ def _svg(film: Replay, vertices: Array) -> str:
 
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{height}" viewBox="0 0 {WIDTH} {height}">',
-        f'<rect y="{high[1] * scale:.1f}" width="{WIDTH}" height="{BELOW * scale:.1f}" fill="#555"/>',
+        f'<rect y="{high[1] * scale:.1f}" width="{WIDTH}" height="{BELOW * scale:.1f}" class="film-floor"/>',
         _polygon(
             pixels(to_world(film.substep_poses[frames], vertices)),
-            'fill="#f2c14e" stroke="#222" stroke-width="1"',
+            'class="film-object" stroke-width="1"',
         ),
-        _polygon(pixels(goal), 'fill="none" stroke="#888" stroke-width="1.2" stroke-dasharray="4 3"'),
+        _polygon(pixels(goal), 'class="film-goal" stroke-width="1.2" stroke-dasharray="4 3"'),
         *(
             _dot(pixels(film.fingers[frames, c]), FINGER_COLOURS[c % len(FINGER_COLOURS)])
             for c in range(film.fingers.shape[1])

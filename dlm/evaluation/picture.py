@@ -39,7 +39,7 @@ def task_figure(
     steps = tasks.video.shape[1]
     figure = Figure(figsize=(1.5 * steps, 1.25 * (len(rows) + 1)), layout="constrained")
     axes = figure.subplots(len(rows) + 1, steps, squeeze=False)
-    window = _window(tasks, k)
+    view = window(tasks, k)
     for t in range(steps):
         axes[0, t].imshow(tasks.video[k, t].numpy(), interpolation="nearest")
         axes[0, t].set_title(f"{t * tasks.samples[k].task.trajectory.dt:.1f} s", fontsize=8)
@@ -51,13 +51,14 @@ def task_figure(
                 _draw_parameters(ax, tasks, k, t, parameters[name])
             else:
                 _draw_outcome(ax, tasks, k, t, outcomes[name])
-            ax.set(xlim=window[0], ylim=window[1], aspect="equal")
+            ax.set(xlim=view[0], ylim=view[1], aspect="equal")
     for ax in axes.flat:
         ax.set(xticks=[], yticks=[])
     return figure
 
 
-def _window(tasks: TaskBatch, k: int) -> tuple[tuple[float, float], tuple[float, float]]:
+def window(tasks: TaskBatch, k: int) -> tuple[tuple[float, float], tuple[float, float]]:
+    """What pictures of task k show: limits of x and y [m]."""
     sample = tasks.samples[k]
     corners = to_world(sample.task.trajectory.poses, sample.task.body.vertices).reshape(-1, 2)
     (left, _), (right, top) = corners.min(0) - REACH, corners.max(0) + REACH

@@ -3,11 +3,12 @@
 import csv
 import io
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
 from dlm.evaluation.outcomes import Outcome
+from dlm.evaluation.significance import Comparison
 
 DATASETS = {"train": "train", "finetune": "fine-tune", "test": "test", "family": "family"}
 """Columns and their headings."""
@@ -58,12 +59,16 @@ class Cell:
 
 @dataclass(frozen=True, kw_only=True)
 class Line:
-    """One row: its cells by data set, and seconds per task where they mean something."""
+    """One row: its cells by data set, and seconds per task where they mean something.
+
+    judged: whether it is an architecture, to be held against doing nothing and the oracle.
+    """
 
     model: str
     cells: dict[str, Cell]
     forward: float | None = None
     backward: float | None = None
+    judged: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +77,7 @@ class Table:
 
     lines: list[Line]
     origin: dict[str, object]
+    comparisons: list[Comparison] = field(default_factory=list)
 
     def as_json(self) -> dict[str, object]:
         """Plain values."""
@@ -98,6 +104,7 @@ class Table:
             "Object-trajectory loss [cm²] (mean over tasks and seeds ± standard deviation over seeds) and seconds per task.",
             _grid(*self.main()),
             *(f"{title}\n\n{_grid(*self.detail(kind))}" for kind, title in DETAILS.items()),
+            *self._tests(),
             "Objects that end more than 5 mm too low, by task number (seeds apart by |)\n\n" + self._drops(),
             "How it came about\n\n" + "\n".join(f"* {k}: {v}" for k, v in self.origin.items()),
         ]
@@ -117,6 +124,15 @@ class Table:
         rows = [[x.model, *(_detail(c, kind) for c in x.cells.values())] for x in self.lines]
         return ["model", *(DATASETS[d] for d in self._datasets)], rows
 
+    def _tests(self) -> list[str]:
+        """Sections of the paired tests, one per data set."""
+        names = dict.fromkeys(c.dataset for c in self.comparisons)
+        return [
+            f"Paired tests, {DATASETS[name]}: loss of the second minus the first; p values corrected (Holm) over all data sets\n\n"
+            + _grid(*comparison_rows([c for c in self.comparisons if c.dataset == name]))
+            for name in names
+        ]
+
     @property
     def _datasets(self) -> list[str]:
         return list(self.lines[0].cells)
@@ -130,6 +146,32 @@ class Table:
             ]
             lines.append(f"* {x.model}: " + "; ".join(parts))
         return "\n".join(lines)
+
+
+def comparison_rows(comparisons: Sequence[Comparison]) -> tuple[list[str], list[list[str]]]:
+    """Heading and rows of paired tests on one data set."""
+    head = ["", "Δ [cm²]", "95 % interval", "better on", "p, ranks", "p, mean", "told"]
+    rows = [
+        [
+            f"{c.first} → {c.second}",
+            _signed(c.difference),
+            f"{_signed(c.low)} to {_signed(c.high)}",
+            f"{c.better:.0%} of tasks",
+            _p(c.p_ranks),
+            _p(c.p_mean),
+            c.verdict,
+        ]
+        for c in comparisons
+    ]
+    return head, rows
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.3f}".replace("-", "−") if abs(value) >= 1e-3 else f"{value:+.0e}".replace("-", "−")
+
+
+def _p(value: float) -> str:
+    return f"{value:.3f}" if value >= 1e-3 else "< 0.001"
 
 
 DETAILS = {
@@ -154,7 +196,7 @@ def _detail(cell: Cell, kind: str) -> str:
         "ratio": _number(cell.ratio),
         "median": _number(cell.median),
         "within": f"{cell.within:.3f}",
-        "rms": f"{cell.rms_mm:.2f}, {cell.rms_deg:.2f}",
+        "rms": f"{_short(cell.rms_mm)}, {_short(cell.rms_deg)}",
         "finger": "–" if cell.finger_loss is None else _number(cell.finger_loss),
         "drops": f"{drops:g} of {cell.tasks} ({unsolved:g})",
     }[kind]
@@ -163,6 +205,10 @@ def _detail(cell: Cell, kind: str) -> str:
 def _number(value: float) -> str:
     """Three digits where it matters, never a misleading 0.000."""
     return f"{value:.3f}" if value >= 1e-3 or value == 0 else f"{value:.1e}"
+
+
+def _short(value: float) -> str:
+    return f"{value:.1f}" if value >= 1 else f"{value:.2f}"
 
 
 def _seconds(value: float | None) -> str:

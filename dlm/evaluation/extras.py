@@ -1,0 +1,63 @@
+"""Results of other experiments (ablations, data-size curves) that the report shows: JSON files, one table or chart each.
+
+`{"title": ..., "caption": ..., "columns": [...], "rows": [[...], ...]}` is a table,
+`{"title": ..., "caption": ..., "x": "tasks", "y": "loss [cm²]", "series": {"structured": [[20, 0.1], ...]}}` a chart.
+`"command"` says what made it.
+"""
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from expert.errors import InvalidProblem
+
+
+@dataclass(frozen=True, kw_only=True)
+class Extra:
+    """One result: a table (columns, rows) or a chart (x, y, series of points), and the command that made it."""
+
+    title: str
+    caption: str = ""
+    command: str = ""
+    columns: list[str] = field(default_factory=list)
+    rows: list[list[str | float | int | None]] = field(default_factory=list)
+    x: str = ""
+    y: str = ""
+    series: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        uneven = [row for row in self.rows if len(row) != len(self.columns)]
+        if not (self.rows or self.series) or uneven:
+            raise InvalidProblem(
+                self.title, expected="rows as long as columns, or series", got=f"{len(uneven)} uneven rows"
+            )
+
+
+def read_extras(paths: Iterable[str | Path]) -> list[Extra]:
+    """Raises InvalidProblem for a file that is none."""
+    return [_read(Path(path)) for path in paths]
+
+
+def _read(path: Path) -> Extra:
+    try:
+        return Extra(**json.loads(path.read_text()))
+    except (OSError, ValueError, TypeError, InvalidProblem) as error:
+        raise InvalidProblem(
+            f"extras {path}", expected="a table or a chart of results", got=f"{error}".splitlines()[0]
+        ) from error
+
+
+def chart(extra: Extra) -> Figure:
+    """Lines through the points of every series, on logarithmic axes."""
+    figure = Figure(figsize=(6.5, 4), layout="constrained")
+    ax = figure.subplots()
+    for name, points in extra.series.items():
+        x, y = zip(*sorted(points), strict=True)
+        ax.plot(x, y, "o-", lw=1.4, ms=4, label=name)
+    ax.set(xlabel=extra.x, ylabel=extra.y, xscale="log", yscale="log")
+    ax.grid(alpha=0.25, which="both", lw=0.5)
+    ax.legend(fontsize=8)
+    return figure
