@@ -31,9 +31,10 @@ def first_scene(seen: Observation, most_vertices: int) -> Scene:
 def outline_of(share: Array, most_vertices: int, smooth: float) -> Array:
     """Counter-clockwise polygon (V, 2) along the level of one half, in pixels from the window's corner."""
     height, width = share.shape
-    lines = contourpy.contour_generator(
+    level = contourpy.contour_generator(
         x=np.arange(width) + 0.5, y=np.arange(height) + 0.5, z=gaussian_filter(share, smooth)
-    ).lines(0.5)
+    )
+    lines = [np.asarray(line) for line in level.lines(0.5)]
     if not lines:
         raise InvalidProblem(
             "video",
