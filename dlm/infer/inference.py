@@ -1,0 +1,188 @@
+"""From a video to the fingers' action and what comes of it in simulation."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import shapely
+
+from datasets.motions import Tasks
+from dlm.infer.clip import Clip, read_clip
+from dlm.infer.segmentation import Segmentation
+from dlm.infer.view import View, find_floor, lowest_row, view_of
+from dlm.perception import Perceived, PerceptionSettings, perceive
+from dlm.simulator import SimulatorSettings
+from dlm.simulator.replay import Replay, replay
+from dlm.structured import ExpertPlanner, Planned, StructuredModel
+from expert.files.contact_plan import answer_fields
+from expert.files.contact_task import task_fields
+from expert.files import problem_of
+from expert.geometry.polygon import diameter
+from expert.types import ContactTask, Plan, require
+
+Refine = Literal["expert"]
+WITHIN_MM, WITHIN_DEG = 2.0, 2.0
+NEEDLESS = 0.15
+"""Corners that change the outline by less are left out [pixels that perception is shown]."""
+UNKNOWN_SCALE = 1e-3
+"""Metres per pixel while the object's size has yet to be measured in pixels."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """What a video cannot say.
+
+    scale: metres per pixel of the video; or object_size: greatest extent of the object [m].  floor: row of the floor's surface
+    [pixels from the top]; None: where the ground's colour begins, or else the object's lowest point.  mass [kg], friction:
+    of fingers and floor alike.  duration [s] that the motion is to take; None: as in the video.
+    """
+
+    scale: float | None = None
+    object_size: float | None = None
+    floor: float | None = None
+    mass: float = 0.1
+    friction: float = 0.5
+    duration: float | None = None
+
+    def __post_init__(self) -> None:
+        known = (self.scale is None) + (self.object_size is None)
+        require(
+            known == 1,
+            "scale",
+            "scale (metres per pixel) or object_size (greatest extent in metres)",
+            "neither" if known == 2 else "both",
+            "give one of them",
+        )
+        for name in ("scale", "object_size", "duration"):
+            value = getattr(self, name)
+            require(value is None or 0 < value < np.inf, name, "a positive number", value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inference:
+    """Answer to a video.
+
+    status: planned, poor_fit (a plan, but what was seen does not explain the video well) or no_plan; reason: in words.
+    result: the plan as it goes in the simulator, on the object as perceived; None without a plan.
+    """
+
+    clip: Clip
+    view: View
+    planned: Planned
+    result: Replay | None
+
+    @property
+    def status(self) -> str:
+        return self.planned.status
+
+    @property
+    def reason(self) -> str:
+        return self.planned.reason
+
+    @property
+    def plan(self) -> Plan | None:
+        return self.planned.plan
+
+    @property
+    def task(self) -> ContactTask | None:
+        return self.planned.task
+
+    @property
+    def follows(self) -> bool:
+        """Whether the simulated object ends within 2 mm and 2 deg of where the video has it."""
+        if self.result is None:
+            return False
+        mm, deg = self.result.final_error
+        return mm <= WITHIN_MM and deg <= WITHIN_DEG
+
+    def solution(self) -> dict[str, Any]:
+        """Actions as a solution file, which `python -m expert verify|draw` and `python -m dlm.simulator` read."""
+        require(self.plan is not None and self.task is not None, "plan", "a plan", self.reason)
+        data = task_fields(self.task, description="perceived in a video")
+        answer = answer_fields(problem_of(data), self.plan)
+        return {"schema": 1, "solution": "contact_trajectory", "problem": data, **answer}
+
+
+def infer(
+    video: str | Path | Clip,
+    scene: Scene,
+    *,
+    segmentation: Segmentation | None = None,
+    model: StructuredModel | None = None,
+    refine: Refine | None = None,
+    start: float = 0.0,
+    end: float | None = None,
+    rate: float | None = None,
+    simulator: SimulatorSettings | None = None,
+) -> Inference:
+    """Positions and forces of two point fingers that move the object of a video as the video shows.
+
+    model: how to plan; None: every contact class is checked, which needs no weights.  refine: "expert" lets the expert plan,
+    slower and over all contact sequences; without it, that happens only where the model finds no plan.  start, end [s], rate: see `read_clip`.
+    Raises InvalidProblem, one line, for a video without one object that stays in view.
+    """
+    require(refine in (None, "expert"), "refine", "expert or nothing", refine)
+    model = model or StructuredModel()
+    steps = model.planning.tasks.steps
+    clip = video if isinstance(video, Clip) else read_clip(video, steps=steps, start=start, end=end, rate=rate)
+    view, seen = look(clip, scene, segmentation or Segmentation(), model.perception)
+    planning = replace(model.planning, tasks=tasks_of(model.planning.tasks, scene, clip))
+    by_model = replace(model, planning=planning)
+    by_expert = replace(by_model, planner=ExpertPlanner())
+    motion = resampled(seen, clip, steps)
+    planned = (by_expert if refine else by_model).plan(motion)
+    if planned.plan is None and not refine:
+        planned = by_expert.plan(motion)
+    result = None
+    if planned.plan is not None and planned.task is not None:
+        result = replay(planned.task, planned.plan.positions, planned.plan.forces, simulator)
+    return Inference(clip=clip, view=view, planned=planned, result=result)
+
+
+def look(
+    clip: Clip, scene: Scene, segmentation: Segmentation, settings: PerceptionSettings
+) -> tuple[View, Perceived]:
+    """Find floor, object and scale; perceive.  Raises InvalidProblem."""
+    floor = scene.floor if scene.floor is not None else find_floor(clip.frames)
+    if floor is None:
+        floor = lowest_row(segmentation.paint(clip.frames, float(clip.frames.shape[1])))
+    frames = segmentation.paint(clip.frames, floor)
+    view = view_of(frames, scale=scene.scale or UNKNOWN_SCALE, floor=floor)
+    seen = simplified(perceive(view.frames, view.camera, settings), NEEDLESS * view.camera.scale)
+    if scene.object_size is None:
+        return view, seen
+    factor = scene.object_size / diameter(seen.vertices)
+    return view.scaled(factor), scaled(seen, factor)
+
+
+def simplified(seen: Perceived, tolerance: float) -> Perceived:
+    """Without corners that change the outline by less than `tolerance` [m].
+
+    Compression leaves errors along the outline that are no noise to perception, which explains them by needless corners, some
+    of them in knots.
+    """
+    whole = max(shapely.get_parts(shapely.Polygon(seen.vertices).buffer(0)), key=shapely.area)
+    plain = shapely.geometry.polygon.orient(whole.simplify(tolerance))
+    vertices = np.array(plain.exterior.coords)[:-1]
+    low = np.flatnonzero(vertices[:, 1] < vertices[:, 1].min() + tolerance)
+    first = int(low[vertices[low, 0].argmin()])
+    return replace(seen, vertices=np.roll(vertices, -first, axis=0))
+
+
+def scaled(seen: Perceived, factor: float) -> Perceived:
+    """The same, if the video's pixels were so many times as large."""
+    return replace(seen, vertices=factor * seen.vertices, poses=seen.poses * [factor, factor, 1.0])
+
+
+def resampled(seen: Perceived, clip: Clip, steps: int) -> Perceived:
+    """Poses at `steps` equally spaced times; between frames, on a straight line."""
+    times = np.linspace(0.0, clip.duration, steps)
+    columns = [np.interp(times, clip.times, column) for column in seen.poses.T]
+    return replace(seen, poses=np.column_stack(columns))
+
+
+def tasks_of(tasks: Tasks, scene: Scene, clip: Clip) -> Tasks:
+    """What planning assumes, with this scene's mass, friction and pace."""
+    duration = clip.duration if scene.duration is None else scene.duration
+    return replace(tasks, mass=scene.mass, friction=scene.friction, dt=duration / (tasks.steps - 1))

@@ -1,0 +1,136 @@
+"""Where the floor and the object are in a video, and the part of it that perception is shown."""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from datasets.render import Camera, Frames
+from dlm.perception.appearance import separate
+from dlm.perception.segment import segment
+from expert.errors import InvalidProblem
+from expert.geometry.pose import Array
+from expert.types import require
+
+COARSE = 96
+"""Side of the picture in which the object is looked for [pixels]."""
+ENOUGH = 28.0
+"""Extent that the object has in what perception is shown, where the video has that many pixels or more."""
+AROUND = 6.0
+"""Kept around the object's motion [pixels of that]."""
+VISIBLE = 12.0
+"""Least contrast between ground and background that counts as an edge [grey levels]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """What perception is shown: frames (T, s, s, 3) of `camera`.
+
+    width, floor: of the video, and row of the floor's surface in it [pixels]; scale [m per pixel of the video].
+    World coordinates: x = 0 in the middle of the video, y = 0 on the floor.
+    """
+
+    frames: Frames
+    camera: Camera
+    width: int
+    floor: float
+    scale: float
+
+    def to_pixels(self, points: Array) -> Array:
+        """World points (..., 2) [m] in pixels (column, row) of the video."""
+        return np.stack(
+            [self.width / 2 + points[..., 0] / self.scale, self.floor - points[..., 1] / self.scale], -1
+        )
+
+    def scaled(self, factor: float) -> "View":
+        """The same view, if its pixels were so many times as large."""
+        camera = self.camera
+        return replace(
+            self,
+            scale=self.scale * factor,
+            camera=replace(
+                camera,
+                scale=camera.scale * factor,
+                centre=camera.centre * factor,
+                below=camera.below * factor,
+            ),
+        )
+
+
+def find_floor(frames: Frames) -> float | None:
+    """Row of the ground's upper edge [pixels, continuous]; None where no ground stands out at the lower edge."""
+    rows = np.median(frames.astype(float), axis=(0, 2))
+    ground, background = np.median(rows[-2:], axis=0), np.median(rows[: max(2, len(rows) // 3)], axis=0)
+    line = ground - background
+    if np.linalg.norm(line) < VISIBLE:
+        return None
+    share = np.clip((rows - background) @ line / (line @ line), 0, 1)
+    first = len(rows) - int(np.argmax(share[::-1] < 0.5))  # ground from here to the lower edge
+    return float(first - share[:first][-2:].sum() + (1 - share[first : first + 2]).sum())
+
+
+def view_of(frames: Frames, *, scale: float, floor: float) -> View:
+    """Look for the object, and cut out a square around its motion and the floor under it.
+
+    floor: row of its surface.  Raises InvalidProblem (field video) unless one object stays in view.
+    """
+    height, width = frames.shape[1:3]
+    require(0 < floor <= height, "floor", f"a row from 0 to {height}", floor)
+    left, top, right, bottom, extent = _find_object(frames, floor)
+    shrink = max(1.0, extent / ENOUGH)
+    margin = AROUND * shrink
+    lower = max(bottom + margin, floor + margin)
+    side = int(np.ceil(max(right - left + 2 * margin, lower - top + margin)))
+    if shrink == 1.0 and height == width and side >= 0.6 * width:
+        side, x, y = width, 0, 0  # a small picture is shown as it is
+    else:
+        x, y = round((left + right - side) / 2), round(lower - side)
+    size = max(4, round(side / shrink))
+    camera = Camera(
+        size=size,
+        scale=scale * side / size,
+        centre=scale * (x + side / 2 - width / 2),
+        below=scale * max(0.0, y + side - floor),
+    )
+    shown = [_resized(_cut(frame, x, y, side), size) for frame in frames]
+    return View(frames=np.stack(shown), camera=camera, width=width, floor=floor, scale=scale)
+
+
+def _find_object(frames: Frames, floor: float) -> tuple[float, float, float, float, float]:
+    """Box around the object's motion (left, top, right, bottom) and its greatest extent in one frame [pixels]."""
+    height, width = frames.shape[1:3]
+    side = max(height, width)
+    x, y = (width - side) // 2, height - side
+    size = min(side, COARSE)
+    small = np.stack([_resized(_cut(frame, x, y, side), size) for frame in frames])
+    below = (height - floor) / side
+    camera = Camera(size=size, scale=1.0, below=size * below)
+    masks = segment(separate(small, camera, floor=True)).masks[:, ::-1]
+    places = [np.argwhere(mask) for mask in masks]
+    low = np.min([p.min(axis=0) for p in places], axis=0)
+    high = np.max([p.max(axis=0) for p in places], axis=0) + 1
+    extent = max(float(np.ptp(p, axis=0).max() + 1) for p in places)
+    (top, left), (bottom, right) = low * side / size + [y, x], high * side / size + [y, x]
+    return left, top, right, bottom, extent * side / size
+
+
+def _cut(frame: Frames, x: int, y: int, side: int) -> Frames:
+    """A square of the frame; beyond the frame its border goes on, so that what touches it still touches the square's."""
+    height, width = frame.shape[:2]
+    pad = [max(0, -y), max(0, y + side - height), max(0, -x), max(0, x + side - width)]
+    wide = cv2.copyMakeBorder(frame, *pad, cv2.BORDER_REPLICATE)
+    return wide[y + pad[0] : y + pad[0] + side, x + pad[2] : x + pad[2] + side]
+
+
+def _resized(frame: Frames, size: int) -> Frames:
+    """Every pixel the mean of what it covers."""
+    return frame if len(frame) == size else cv2.resize(frame, (size, size), interpolation=cv2.INTER_AREA)
+
+
+def lowest_row(frames: Frames) -> float:
+    """Row of the lower edge of the object in the first frame: where it stands if the floor itself cannot be seen."""
+    try:
+        _, _, _, bottom, _ = _find_object(frames[:1].repeat(2, axis=0), float(frames.shape[1]))
+    except InvalidProblem:
+        return float(frames.shape[1])  # whatever is wrong is said where the whole video is looked at
+    return bottom
