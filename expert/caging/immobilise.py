@@ -16,7 +16,7 @@ import numpy as np
 from expert.geometry.polygon import contains, facet_frames, facets, reflex_vertices, signed_distance
 from expert.geometry.pose import Array
 
-CLEARANCES = (0.04, 0.02, 0.01, 0.005)
+CLEARANCES = (0.04, 0.02, 0.01, 0.005, 0.0025)
 """Tried in this order, relative to the object's size."""
 STARTS = 8
 """Newton's method starts so often for each triple of features."""

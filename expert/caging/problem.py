@@ -158,6 +158,7 @@ HalfRanges = tuple[tuple[float, float], ...]
 class CageProblem:
     """Where do `count` fingers, on top of the fixed ones, cage the object at this pose? (Thesis 5.1)
 
+    fewest: count is then the most fingers there are, and as few of them are used as the search can do with.
     margin: clearance that each condition keeps, relative to the object's diameter.
     rotation: pairs (below, above) of the half-ranges [rad] to try about the pose, in order; empty: the default ladder.
     parallel: all grippers open along one common direction.
@@ -166,6 +167,7 @@ class CageProblem:
     shape: Shape
     pose: Array
     count: int
+    fewest: bool = False
     fixed: Array = field(default_factory=lambda: np.empty((0, 2)))
     walls: Array = field(default_factory=lambda: np.empty((0, 2, 2)))
     grippers: tuple[Gripper, ...] = ()
@@ -191,6 +193,8 @@ class CageProblem:
         require(self.count >= 0, "fingers.count", "a number >= 0", self.count)
         total = self.count + len(self.fixed)
         require(total >= 2, "fingers", "at least 2 fingers, fixed ones included", total)
+        alone = not (self.fewest and self.grippers)
+        require(alone, "fingers.fewest", "false with grippers, which name their fingers", "true")
         for gripper in self.grippers:
             known = max(gripper.fingers) < self.count
             require(known, "fingers.grippers", f"indices from 0 to {self.count - 1}", list(gripper.fingers))

@@ -14,10 +14,11 @@ import numpy as np
 
 from expert.caging.frame import Frame
 from expert.caging.immobilise import candidates
-from expert.caging.model import Element, SweptModel
+from expert.caging.model import SweptModel
 from expert.caging.problem import Arrangement, CageProblem
 from expert.caging.requirements import objective, require
-from expert.caging.solution import CageSolution, Meeting
+from expert.caging.rings import break_symmetry, hubs, labelled, rings
+from expert.caging.solution import CageSolution, CageStatus, Meeting
 from expert.caging.swept import SweptGeometry
 from expert.caging.thesis import ThesisModel, slices
 from expert.errors import InvalidProblem
@@ -38,6 +39,12 @@ THESIS_SLICES = 9
 """Slices of MIP1, as many as in Thesis 5.1.7."""
 QUICK = 3
 """Ranges of the ladder that the quick part tries."""
+KNOWN: dict[CageStatus, str] = {
+    "caged": "caged",
+    "none_found": "no cage of the kind searched for",
+    "time_limit": "undecided in their share of the time",
+}
+"""What a search for some number of fingers says.  None of it is a proof that they cannot cage the object."""
 MOST_CUTS = 5
 """Refuted answers per model after which the next one is tried."""
 
@@ -115,6 +122,8 @@ def solve(
         raise InvalidProblem(
             "fingers.count", expected="fingers to place", got="positions", remedy="verify it"
         )
+    if problem.fewest:
+        return _fewest(problem, time_limit, method, solver)
     began = time.perf_counter()
     tally = Tally(problem, began + time_limit)
     if method == "thesis":
@@ -122,6 +131,32 @@ def solve(
     else:
         _search_ranges(tally, method, solver)
     return _answer(tally, time.perf_counter() - began)
+
+
+def _fewest(problem: CageProblem, time_limit: float, method: Method, solver: Solver) -> CageSolution:
+    """The first count of fingers, from the least, for which a cage is found; each has an equal share of the time left."""
+    began = time.perf_counter()
+    answers: dict[int, CageSolution] = {}
+    for count in range(max(0, 2 - len(problem.fixed)), problem.count + 1):
+        left = max(began + time_limit - time.perf_counter(), 0.0)
+        answers[count] = answer = solve(
+            replace(problem, count=count, fewest=False),
+            time_limit=left / (problem.count + 1 - count),
+            method=method,
+            solver=solver,
+        )
+        if answer.found:
+            break
+    undecided = any(other.status == "time_limit" for other in answers.values())
+    return replace(
+        answer,
+        status="time_limit" if undecided and not answer.found else answer.status,
+        reason="; ".join(f"{n} fingers: {KNOWN[other.status]}" for n, other in answers.items()),
+        seconds=time.perf_counter() - began,
+        attempts=sum(other.attempts for other in answers.values()),
+        refuted=sum(other.refuted for other in answers.values()),
+        unconfirmed=sum(other.unconfirmed for other in answers.values()),
+    )
 
 
 def _search_slices(tally: Tally, solver: Solver) -> None:
@@ -214,16 +249,16 @@ def _try_models(tally: Tally, attempt: Attempt, solver: Solver) -> None:
     clearance = problem.margin * problem.shape.size / frame.radius
     geometry = SweptGeometry(frame.body(problem.shape.vertices), clearance, attempt.most_pieces)
     for ring in rings(problem, frame):
-        alike = len(ring) == problem.count and not _labelled(problem)
-        for hubs in _hubs(len(ring), alike):
+        alike = len(ring) == problem.count and not labelled(problem)
+        for filling in hubs(len(ring), alike):
             if tally.left <= 0 or tally.done:
                 return
             model = SweptModel(
-                geometry, ring, (-attempt.below, attempt.above), hubs=hubs, one_piece=attempt.one_piece
+                geometry, ring, (-attempt.below, attempt.above), hubs=filling, one_piece=attempt.one_piece
             )
             if not model.feasible:
                 continue
-            _break_symmetry(model, problem)
+            break_symmetry(model, problem)
             require(model, problem, frame, solver)
             _search(tally, model, frame, attempt.seconds, solver)
 
@@ -244,53 +279,3 @@ def _search(
             tally.keep(fingers, report, proposal.meetings)
             return
         model.cut_off()
-
-
-def rings(problem: CageProblem, frame: Frame) -> Iterator[list[Element]]:
-    """Orders in which the loop may visit the searched fingers, and with them the fixed fingers or one wall."""
-    fixed = frame.relative(problem.fixed)
-    around = [Element(ends=np.stack([p, p])) for p in fixed[np.argsort(np.arctan2(*fixed.T[::-1]))]]
-    for order in _orders(problem):
-        free = [Element(finger=k) for k in order]
-        for a, b in frame.relative(problem.walls):
-            ends = np.stack([a, b])
-            yield [*free, *around, Element(ends=ends, joined=True), Element(ends=ends)]
-        if len(free) + len(around) >= 2:
-            yield [*free, *around]
-
-
-def _labelled(problem: CageProblem) -> bool:
-    """Whether searched fingers differ from one another."""
-    return bool(problem.grippers) or problem.cost == "max_opening"
-
-
-def _orders(problem: CageProblem) -> Iterator[tuple[int, ...]]:
-    """Cyclic orders of the searched fingers: one, unless grippers or a cost tell them apart."""
-    if not _labelled(problem):
-        yield tuple(range(problem.count))
-        return
-    if problem.parallel and problem.count == 4 and len(problem.grippers) == 2:
-        (a, b), (c, d) = (gripper.fingers for gripper in problem.grippers)
-        yield (a, b, d, c)  # the first gripper below the second, counter-clockwise
-        yield (c, d, b, a)
-        return
-    for rest in itertools.permutations(range(1, problem.count)):
-        yield (0, *rest)
-
-
-def _hubs(count: int, alike: bool) -> list[tuple[int, int]]:
-    """Ways to fill the loop at L and U.  Where elements are alike, renaming lets the fan at U start at element 0."""
-    if count == 3:
-        return [(0, 0)]
-    ways = range(2 if count in (2, 4) else count)  # on a square, opposite corners span the same diagonal
-    pairs = [(a, b) for a in ways for b in ways if not alike or count == 2 or b == 0]
-    return sorted(pairs, key=lambda p: p[0] == p[1])
-
-
-def _break_symmetry(model: SweptModel, problem: CageProblem) -> None:
-    if len(model.ring) > problem.count or _labelled(problem):
-        return
-    if problem.count == 3:
-        model.leftmost_first([1, 2])
-    elif problem.count == 4 or problem.count == 2:
-        model.leftmost_first([problem.count // 2])

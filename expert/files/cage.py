@@ -31,7 +31,7 @@ def read(data: dict[str, Any]) -> tuple[CageProblem | Arrangement, dict[str, Any
         np.stack([wall.array("from", (2,)), wall.array("to", (2,))])
         for wall in file.sections("walls", ("from", "to"))
     ]
-    fingers = file.section("fingers", ("count", "positions", "fixed", "grippers", "parallel"))
+    fingers = file.section("fingers", ("count", "fewest", "positions", "fixed", "grippers", "parallel"))
     fixed = fingers.array("fixed", (None, 2)) if "fixed" in fingers else np.empty((0, 2))
     options = file.section("options", ("margin", "rotation", "time_limit", "method", "solver"), optional=True)
     common: dict[str, Any] = {"shape": shape, "pose": pose, "walls": np.reshape(walls, (-1, 2, 2))}
@@ -40,6 +40,7 @@ def read(data: dict[str, Any]) -> tuple[CageProblem | Arrangement, dict[str, Any
     problem = CageProblem(
         **common,
         count=fingers.integer("count"),
+        fewest=_flag(fingers, "fewest"),
         fixed=fixed,
         grippers=read_grippers(fingers),
         parallel=_flag(fingers, "parallel"),
@@ -81,7 +82,7 @@ def require_size(field: str, points: Array) -> None:
 
 
 def _read_arrangement(file: Section, fingers: Section, fixed: Array, common: dict[str, Any]) -> Arrangement:
-    for key in ("count", "grippers", "parallel"):
+    for key in ("count", "fewest", "grippers", "parallel"):
         if key in fingers:
             raise InvalidProblem(
                 fingers.path(key), expected="nothing beside positions", got="both", remedy="remove one"
@@ -153,10 +154,9 @@ def read_answer(problem: "Problem", data: dict[str, Any]) -> CageSolution:
     if isinstance(problem.task, Arrangement):
         raise InvalidProblem("problem.fingers", expected="count", got="positions: nothing to solve")
     limits = file.array("rotation_range", (2,)) if "rotation_range" in file else None
-    count = problem.task.count
     return CageSolution(
         status=status,
-        fingers=file.array("fingers", (count, 2)) if status == "caged" else np.empty((0, 2)),
+        fingers=_read_fingers(file, problem.task) if status == "caged" else np.empty((0, 2)),
         rotation_range=(float(limits[0]), float(limits[1])) if limits is not None else None,
         topology=tuple(
             Meeting(**{key: meeting.integer(key) for key in _MEETING})
@@ -169,3 +169,15 @@ def read_answer(problem: "Problem", data: dict[str, Any]) -> CageSolution:
         unconfirmed=file.integer("unconfirmed", 0),
         reason=file.text("reason", ""),
     )
+
+
+def _read_fingers(file: Section, task: CageProblem) -> Array:
+    """As many as the problem searched for, or at most so many where it asked for the fewest."""
+    if not task.fewest:
+        return file.array("fingers", (task.count, 2))
+    fingers = file.array("fingers", (None, 2))
+    if len(fingers) > task.count:
+        raise InvalidProblem(
+            file.path("fingers"), expected=f"at most {task.count} fingers", got=str(len(fingers))
+        )
+    return fingers
