@@ -8,8 +8,14 @@ from datasets.render import Camera, Frames, ground_coverage
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
 
-DARKEST_NOISE = 0.7
-"""Least standard deviation that is assumed of a pixel [grey levels]: rounding, and the renderer's own errors."""
+LEAST_NOISE = 0.5
+"""Standard deviation that is assumed of a pixel at least [grey levels]: it is rounded."""
+MODEL_ERROR = 0.01
+"""Standard deviation of what no exact coverage explains, the renderer's own errors among it [share of a pixel]."""
+FOREIGN = 25.0
+"""A colour this far from every mixture of object and background is something else [grey levels]."""
+CANDIDATES = 3
+"""Every so many pixels of a frame tell of background and lighting."""
 
 
 @dataclass(frozen=True)
@@ -40,45 +46,53 @@ def separate(video: Frames, camera: Camera, floor: bool) -> Appearance:
     share = ((plain - background) * line).sum(axis=-1) / length
     off = np.linalg.norm(plain - background - share[..., None] * line, axis=-1) * light
     contrast = light * np.sqrt(length)
-    precision = np.broadcast_to((contrast / noise) ** 2, share.shape)
-    return Appearance(share, precision, off > max(6 * noise, 25.0), noise, contrast)
+    precision = 1 / ((noise / contrast) ** 2 + MODEL_ERROR**2)
+    foreign = off > max(6 * noise, FOREIGN)
+    return Appearance(share, np.broadcast_to(precision, share.shape), foreign, noise, contrast)
 
 
 def _background(images: Array, ground: Array) -> tuple[Array, Array, float]:
-    """Lighting (h, w) around 1, background under even light (h, w, 3), noise."""
-    regions = [region for region in (ground == 0, ground == 1) if region.any()]
-    light, inside = np.ones(ground.shape), np.ones(images.shape[:3], dtype=bool)
+    """Lighting (h, w) around 1, background under even light (h, w, 3), noise.
+
+    Brightness is lighting times the colour of the wall or the ground: its logarithm is a sum, fitted robustly to
+    pixels of either; what is neither (the object, something in front) differs in hue or brightness and is left out.
+    """
     basis = _smooth_basis(*ground.shape)
-    for _ in range(4):
-        even = images / light[..., None]
-        colours = [np.median(even[:, region][inside[:, region]], axis=0) for region in regions]
-        background = colours[0] + ground[..., None] * (colours[-1] - colours[0])
-        off = np.linalg.norm(even - background, axis=-1)
-        brightness = (images * background).sum(-1) / (background * background).sum(-1)
-        hue = np.linalg.norm(images - brightness[..., None] * background, axis=-1)
-        inside = (
-            (hue < 3 * np.median(hue) + 3) & (off < 4 * np.median(off) + 3) & ((ground == 0) | (ground == 1))
-        )
-        light = _smooth(basis, brightness, inside)
-    rest = (images - light[..., None] * background)[inside]
-    noise = 1.4826 * float(np.median(np.abs(rest - np.median(rest, axis=0))))
-    return light, background, max(noise, DARKEST_NOISE)
+    regions = [region for region in (ground == 0, ground == 1) if region.any()]
+    terms = np.stack([region[..., None] for region in regions], axis=-2)[..., 0]
+    design = np.concatenate([terms.astype(float), basis], axis=-1)
+    known = np.zeros(images.shape[:3], dtype=bool)
+    known[:, 1::CANDIDATES, ::CANDIDATES] = (terms.any(axis=-1))[1::CANDIDATES, ::CANDIDATES]
+    sample, where = images[known], np.broadcast_to(design, (*known.shape, design.shape[-1]))[known]
+    region = where[:, : len(regions)].argmax(axis=-1)
+    brightness = np.maximum(sample.sum(axis=-1), 1.0)
+    hue = sample / brightness[:, None]
+    typical = np.array([np.median(hue[region == k], axis=0) for k in range(len(regions))])
+    tinted = np.linalg.norm(hue - typical[region], axis=-1) * brightness
+    inside = tinted < 3 * np.median(tinted) + 3
+    level = np.array([np.median(brightness[region == k]) for k in range(len(regions))])
+    rest = np.log(brightness) - np.log(level[region])
+    for _ in range(6):
+        spread = 1.4826 * np.median(np.abs(rest[inside]))
+        near = inside & (np.abs(rest) < 2.5 * spread + 3 / brightness)
+        weight = np.where(near, brightness**2, 0)
+        weight /= weight.max()
+        matrix = where.T @ (weight[:, None] * where) + 1e-6 * np.eye(design.shape[-1])
+        surface = np.linalg.solve(matrix, where.T @ (weight * np.log(brightness)))
+        rest = np.log(brightness) - where @ surface
+    light = np.exp(np.clip(basis @ surface[len(regions) :], -1.5, 1.5))
+    even = sample / np.broadcast_to(light, known.shape)[known][:, None]
+    colours = [np.median(even[near & (region == k)], axis=0) for k in range(len(regions))]
+    background = colours[0] + ground[..., None] * (colours[-1] - colours[0])
+    off = (sample - (even * 0 + np.array(colours)[region]) * np.broadcast_to(light, known.shape)[known][:, None])[near]
+    noise = 1.4826 * float(np.median(np.abs(off - np.median(off, axis=0))))
+    return light, background, max(noise, LEAST_NOISE)
 
 
 def _smooth_basis(height: int, width: int) -> Array:
-    """Polynomials of second degree over the image, (h, w, 6)."""
+    """Polynomials of second degree over the image without the constant, (h, w, 5)."""
     y, x = np.meshgrid(np.linspace(-1, 1, height), np.linspace(-1, 1, width), indexing="ij")
-    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
-
-
-def _smooth(basis: Array, values: Array, inside: Array) -> Array:
-    """Least squares of values (T, h, w) where `inside`; the mean over the image is 1."""
-    count = inside.sum(axis=0)
-    total = np.where(inside, values, 0).sum(axis=0)
-    flat = basis.reshape(-1, basis.shape[-1])
-    matrix = flat.T @ (count.reshape(-1, 1) * flat) + 1e-3 * np.eye(basis.shape[-1])
-    surface = basis @ np.linalg.solve(matrix, flat.T @ total.ravel())
-    return np.clip(surface / surface.mean(), 0.2, 5)
+    return np.stack([x, y, x * x, x * y, y * y], axis=-1)
 
 
 def _object_colour(plain: Array, background: Array, noise: float) -> Array:
