@@ -17,7 +17,7 @@ MOST = 20_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class DeadEnd:
+class DeadEndEvent:
     """At path parameter s the free space around `first` to `last` vanishes.
 
     first, last: relative configurations (3,) between which the object can still slide at that moment; equal where it
@@ -34,7 +34,7 @@ class DeadEnd:
         return self.first + np.linspace(0, 1, count)[:, None] * (self.last - self.first)
 
 
-def dead_end_events(path: FingerPath) -> list[DeadEnd]:
+def dead_end_events(path: FingerPath) -> list[DeadEndEvent]:
     """All dead ends along a finger path but the goal itself, reachable or not, in order of s.
 
     Raises ExpertError where there are more than can be listed.
@@ -75,7 +75,7 @@ def _free_intervals(path: FingerPath, row: Array) -> list[tuple[float, float]]:
     cuts = np.unique(np.clip([low, high, *_crossings(path.vertices, seen, step)], low, high))
     middles = 0.5 * (cuts[1:] + cuts[:-1])
     places = seen[None] + middles[:, None, None] * step
-    outside = (signed_distance(path.vertices, places) >= -TOUCH).all(axis=1)
+    outside = signed_distance(path.vertices, places).min(axis=1) >= -TOUCH
     ends = itertools.pairwise(cuts)
     parts: list[tuple[float, float]] = []
     for (a, b), out in zip(ends, outside, strict=True):
@@ -96,13 +96,15 @@ def _crossings(vertices: Array, points: Array, step: Array) -> list[float]:
     return [float(x) for x in t.ravel()]
 
 
-def _dead_end(path: FingerPath, contacts: np.ndarray, row: Array, interval: tuple[float, float]) -> DeadEnd:
+def _dead_end(
+    path: FingerPath, contacts: np.ndarray, row: Array, interval: tuple[float, float]
+) -> DeadEndEvent:
     ends = [np.array([*(row[2:4] + t * row[12:14]), row[4]]) for t in interval]
     touched = tuple((int(i), int(j)) for i, j in contacts[row[7:11][row[7:11] >= 0].astype(int)])
-    return DeadEnd(s=float(row[0] + row[1]), first=ends[0], last=ends[1], contacts=touched)
+    return DeadEndEvent(s=float(row[0] + row[1]), first=ends[0], last=ends[1], contacts=touched)
 
 
-def _is_passed(path: FingerPath, end: DeadEnd) -> bool:
+def _is_passed(path: FingerPath, end: DeadEndEvent) -> bool:
     """Whether the object is at the goal, or may stay, up to rounding, while the fingers go on for a segment."""
     if np.abs(end.configurations(2)).max() <= AT_GOAL:
         return True
@@ -111,8 +113,8 @@ def _is_passed(path: FingerPath, end: DeadEnd) -> bool:
     return stop - end.s > 1e-6 and bool((path.deepest(end.configurations(5), end.s, stop) <= TOUCH).all())
 
 
-def _distinct(ends: list[DeadEnd]) -> list[DeadEnd]:
-    kept: list[DeadEnd] = []
+def _distinct(ends: list[DeadEndEvent]) -> list[DeadEndEvent]:
+    kept: list[DeadEndEvent] = []
     for end in sorted(ends, key=lambda e: e.s):
         same = (
             abs(end.s - k.s) < 1e-7

@@ -146,7 +146,14 @@ def _spans(normals: Array, m: int) -> bool:
 
 @numba.njit(cache=True)
 def _weighted(
-    null: Array, ids: Array, m: int, contacts: Array, normals: Array, offsets: Array, knots: Array, k: int
+    null: Array,
+    ids: np.ndarray,
+    m: int,
+    contacts: np.ndarray,
+    normals: Array,
+    offsets: Array,
+    knots: Array,
+    k: int,
 ) -> tuple[float, float, float, float, float]:
     """P at the segment's start (re, im), its change over the segment (re, im), and E, for one null vector."""
     px, py, dx, dy, e = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -234,9 +241,9 @@ def _double(
 
 @numba.njit(cache=True)
 def _place(
-    ids: Array,
+    ids: np.ndarray,
     m: int,
-    contacts: Array,
+    contacts: np.ndarray,
     normals: Array,
     offsets: Array,
     fingers: Array,
@@ -273,9 +280,9 @@ def _place(
 
 @numba.njit(cache=True)
 def _on_facets(
-    ids: Array,
+    ids: np.ndarray,
     m: int,
-    contacts: Array,
+    contacts: np.ndarray,
     starts: Array,
     tangents: Array,
     lengths: Array,
@@ -304,7 +311,14 @@ def _on_facets(
 
 @numba.njit(cache=True)
 def _closes(
-    ids: Array, m: int, null: Array, count: int, contacts: Array, normals: Array, knots: Array, row: Array
+    ids: np.ndarray,
+    m: int,
+    null: Array,
+    count: int,
+    contacts: np.ndarray,
+    normals: Array,
+    knots: Array,
+    row: Array,
 ) -> bool:
     """Whether lambda >= 0 balances the contacts and their gaps close; writes the rate sum lambda dg/ds to row[11]."""
     c, s = np.cos(row[4]), np.sin(row[4])
@@ -335,7 +349,7 @@ def _closes(
 
 @numba.njit(cache=True)
 def _try_set(
-    ids: Array, m: int, contacts: Array, normals: Array, offsets: Array, starts: Array, tangents: Array,
+    ids: np.ndarray, m: int, contacts: np.ndarray, normals: Array, offsets: Array, starts: Array, tangents: Array,
     lengths: Array, knots: Array, events: Array, count: int,
 ) -> int:  # fmt: skip
     """Append the events of one contact set, on all segments, to `events` (., COLUMNS); returns the new count."""
@@ -375,7 +389,7 @@ def _try_set(
 
 @numba.njit(cache=True)
 def closing_contacts(
-    contacts: Array, compatible: Array, normals: Array, offsets: Array, starts: Array, tangents: Array,
+    contacts: np.ndarray, compatible: np.ndarray, normals: Array, offsets: Array, starts: Array, tangents: Array,
     lengths: Array, knots: Array, events: Array,
 ) -> int:  # fmt: skip
     """Fill `events` (., COLUMNS) with every configuration at which a minimal contact set closes; returns how many.

@@ -65,6 +65,13 @@ class FingerPath:
             shape=self.shape, pose=self.pose, fingers=(1 - t) * self.knots_w[k] + t * self.knots_w[k + 1]
         )
 
+    def configurations(self, poses: Array) -> Array:
+        """Relative configurations (M, 3), within half a turn of the goal, of world poses (M, 3)."""
+        poses = np.reshape(poses, (-1, 3))
+        middle = poses[:, :2] + (rotation(poses[:, 2]) @ self.frame.centre)
+        turn = (poses[:, 2] - self.pose[2] + np.pi) % (2 * np.pi) - np.pi
+        return np.column_stack([self.frame.relative(middle), turn])
+
     def gap(self, configurations: Array, s: float) -> Array:
         """Distance (M,) of the nearest finger from the object at configurations (M, 3); negative: inside."""
         return self._gaps(configurations, self.fingers(s)).min(axis=1)

@@ -6,6 +6,7 @@ free configuration of the slab, and a motion passes from slab to slab at a confi
 reached is an outer bound; slabs and cells are halved where the flood leaves the orientations allowed or is unbounded.
 """
 
+import itertools
 import time
 from collections import deque
 from dataclasses import dataclass, field
@@ -35,6 +36,12 @@ class Slab:
         """Orientations reached [rad], relative to the goal."""
         bounds = [signed_bounds(cell) for cell in self.reached]
         return min(b[0] for b in bounds), max(b[1] for b in bounds)
+
+    @property
+    def shift(self) -> float:
+        """Largest relative distance of a position reached from the goal."""
+        corners = shapely.get_coordinates([p for polygons in self.reached.values() for p in polygons])
+        return float(np.linalg.norm(corners, axis=1).max())
 
     def meets(self, first: Array, last: Array) -> bool:
         """Whether it holds a configuration between two (3,) with one orientation."""
@@ -77,13 +84,13 @@ class Tube:
 class Flood:
     """One flood: `width` units per cell and slabs of matching length to begin with, halved up to `depth` times.
 
-    limits (K - 1,) [rad]: largest orientation on either side of the goal that counts as held, by segment.
+    limit [rad]: orientations farther from the goal count as leaking.  until: processor seconds that a run may take.
     """
 
     def __init__(
-        self, path: FingerPath, limits: Array, *, width: int, depth: int, until: float = np.inf
+        self, path: FingerPath, limit: float, *, width: int, depth: int, until: float = np.inf
     ) -> None:
-        self.path, self.limits, self.width, self.depth = path, limits, width, depth
+        self.path, self.limit, self.width, self.depth = path, limit, width, depth
         self.deadline = time.process_time() + until
 
     def run(self) -> Tube:
@@ -93,7 +100,7 @@ class Flood:
         for k in range(len(self.path.knots) - 1):
             count = max(1, int(np.ceil(self._motion(k, k + 1) / (self.width * UNIT))))
             stops = k + np.linspace(0, 1, count + 1)
-            for low, high in zip(stops[:-1], stops[1:], strict=True):
+            for low, high in itertools.pairwise(stops):
                 if not self._advance(tube, before, float(low), float(high), self.width, self.depth):
                     return tube
                 before = tube.slabs[-1]
@@ -123,7 +130,6 @@ class Flood:
         """What is reached in [low, high] from a slab before it (None: from the goal), or None if that is not held."""
         slack = 0.5 * self._motion(low, high) * self.path.frame.radius
         cells = CellComplex(self.path.arrangement(0.5 * (low + high)), slack, on_grid=True)
-        limit = self.limits[self.path.segment(low)[0]]
         queue: deque[tuple[Cell, int]] = deque()
         seen: set[tuple[Cell, int]] = set()
 
@@ -141,7 +147,7 @@ class Flood:
         while queue:
             cell, k = queue.popleft()
             least, most = signed_bounds(cell)
-            if cells.inner(cell).unbounded[k] or least < -limit or most > limit:
+            if cells.inner(cell).unbounded[k] or max(-least, most) > self.limit:
                 return None
             polygon = cells.inner(cell).polygons[k]
             for start in (cell.start - width, cell.start + width):

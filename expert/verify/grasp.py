@@ -1,0 +1,239 @@
+"""Does every start in a cage end in one grasp?  Independent of how the finger path was found (Thesis 5.2).
+
+Fingers move slowly and without friction: the object rests until it is touched and then yields, by whatever support
+friction, within its free space F(s).  Where all that it can reach is bounded, it stops only where a part of free space
+vanishes: at a local maximum of s over {(q, s): q in F(s)}.  So if none of these can be reached, and nothing but the goal
+can be at the end, every start in Q0, the goal's component of F(0), ends at the goal.
+
+cages      at each knot the goal is caged within the half-range asked for: the thesis's conditions, which do not suffice;
+           everything that can be reached from Q0 stays bounded in between
+dead ends  the local maxima of s, exactly, and whether what can be reached meets them
+end        contacts in form closure, and of all that can be reached only the goal is left
+start      Q0, from inside
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from expert.caging.problem import START_TOLERANCE
+from expert.errors import InvalidProblem
+from expert.geometry.pose import Array
+from expert.grasping.problem import GraspProblem, GraspSolution
+from expert.types import readonly
+from expert.verify.cage import verify_cage
+from expert.verify.cage_search import UNIT
+from expert.verify.dead_ends import DeadEndEvent, dead_end_events
+from expert.verify.end_grasp import (
+    NOT_ISOLATED,
+    form_closure,
+    gap_gradients,
+    isolation,
+    observability_rank,
+    touching,
+)
+from expert.verify.event_kernel import TOUCH
+from expert.verify.finger_path import FingerPath
+from expert.verify.grasp_report import Cages, DeadEnd, DeadEnds, EndGrasp, GraspReport, Verdict
+from expert.verify.reach_tube import FINEST, Flood, Tube
+from expert.verify.start_set import StartSet
+
+SPREAD = np.radians(10)
+"""What can be reached may leave the first half-range by this before it counts as leaking."""
+COARSEST = 64
+"""Width of the flood's cells in the first round, in units of the cage verifier: 4 degrees."""
+DEPTH = 5
+"""How often the flood may halve a slab where it leaks."""
+
+
+def verify(task: GraspProblem, answer: GraspSolution | None = None) -> GraspReport:
+    """Report on the finger path that an answer claims to be a certified grasp.
+
+    Raises InvalidProblem where there is none to check.
+    """
+    if answer is None:
+        raise InvalidProblem("fingers", expected="paths to verify", got="nothing", remedy="solve it first")
+    if len(answer.path) == 0:
+        raise InvalidProblem(
+            "status", expected="finger paths", got=answer.status, remedy="there is no claim to check"
+        )
+    return verify_grasp(task, answer.path, answer.facets)
+
+
+def verify_grasp(
+    problem: GraspProblem,
+    path: Array,
+    facets: Sequence[int] = (),
+    *,
+    full: bool = True,
+    rounds: int = 4,
+    time_limit: float = 20.0,
+) -> GraspReport:
+    """Decide whether fingers along straight lines between knots (K, N, 2) [m] bring all of Q0 to the goal.
+
+    facets: the one that each finger claims to touch in the end; empty: no claim.  full: report on all parts although one
+    has failed.  rounds: refinements of what can be reached; time_limit [s]: processor time for it.
+    Raises InvalidProblem for a path that does not fit the problem.
+    """
+    knots = readonly(path, (len(problem.half_ranges), problem.count, 2), "fingers.path")
+    check = _Check(problem, FingerPath(problem.shape, problem.pose, knots), tuple(facets))
+    return check.run(full, rounds, time_limit)
+
+
+class _Check:
+    """The parts of one verification, the cheap ones first, and what they have found so far."""
+
+    def __init__(self, problem: GraspProblem, path: FingerPath, facets: tuple[int, ...]) -> None:
+        self.problem, self.path, self.facets = problem, path, facets
+        self.refuted: list[str] = []
+        self.doubts: list[str] = []
+        self.seconds: dict[str, float] = {}
+        self.end: EndGrasp | None = None
+        self.start: StartSet | None = None
+        self.cages: Cages | None = None
+        self.dead_ends: DeadEnds | None = None
+        self.isolation = NOT_ISOLATED
+
+    def run(self, full: bool, rounds: int, time_limit: float) -> GraspReport:
+        """All parts; unless `full`, only up to the first that fails."""
+        jams = partial(self.check_dead_ends, rounds, time_limit)
+        steps: dict[str, Callable[[], None]] = {
+            "path": self.check_path,
+            "end": self.check_end,
+            "knots": self.check_knots,
+            "start": self.check_start,
+            "dead_ends": jams,
+        }
+        for name, step in steps.items():
+            began = time.process_time()
+            step()
+            self.seconds[name] = time.process_time() - began
+            if (self.refuted or self.doubts) and (name == "path" or not full):
+                break
+        verdict: Verdict = "refuted" if self.refuted else "unknown" if self.doubts else "certified"
+        reason = "; ".join(self.refuted or self.doubts)
+        return GraspReport(
+            verdict=verdict, reason=reason, cages=self.cages, dead_ends=self.dead_ends, end=self.end,
+            start=self.start, seconds=self.seconds,
+        )  # fmt: skip
+
+    def check_path(self) -> None:
+        """Grippers can do it, and no finger enters the object that rests at the goal."""
+        for k, fingers in enumerate(self.path.knots_w):
+            if fault := _gripper_fault(self.problem, fingers):
+                self.refuted.append(f"knot {k}: {fault}")
+        depth = self.path.deepest(np.zeros((1, 3)), 0.0, self.path.last)[0] * self.path.frame.radius
+        if depth > START_TOLERANCE * self.problem.shape.size:
+            self.refuted.append(f"a finger enters the object at its goal by {depth:.2g} m")
+
+    def check_end(self) -> None:
+        """Form closure of the contacts at the last knot."""
+        fingers, facets = self.path.knots[-1], self.path.facets
+        contacts = touching(facets, fingers)
+        for finger, facet in enumerate(self.facets):
+            if (finger, facet) not in contacts:
+                self.refuted.append(f"finger {finger} does not end on facet {facet}")
+        order = form_closure(facets, fingers, contacts)
+        self.isolation = isolation(facets, self.path.vertices, fingers, contacts)
+        self.end = EndGrasp(
+            contacts=tuple(contacts),
+            form_closure=order,
+            observability_rank=observability_rank(gap_gradients(facets, fingers, contacts)),
+            extent=(self.isolation.shift * self.path.frame.radius, self.isolation.turn),
+        )
+        if order == 0:
+            self.refuted.append("the contacts at the end are not in form closure")
+
+    def check_knots(self) -> None:
+        """Nested cages at the knots."""
+        ranges = np.full((len(self.path.knots), 2), np.nan)
+        for k in range(len(ranges)):
+            report = verify_cage(self.path.arrangement(k), range_resolution=1.01 * UNIT)
+            if report.rotation_range is not None:
+                ranges[k] = np.array(report.rotation_range) - self.problem.pose[2]
+            elif report.verdict == "escapes":
+                self.refuted.append(f"the object can escape at knot {k}")
+        self.cages = Cages(half_ranges=self.problem.half_ranges, knot_ranges=ranges)
+        if not self.cages.nested and not self.refuted:
+            wide = np.flatnonzero(~(np.abs(ranges).max(axis=1) <= self.problem.half_ranges + 1e-9))
+            self.doubts.append(f"orientations beyond the half-range may be reached at knots {wide.tolist()}")
+
+    def check_start(self) -> None:
+        """Q0."""
+        self.start = StartSet(self.path)
+
+    def check_dead_ends(self, rounds: int, time_limit: float) -> None:
+        """What can be reached from Q0 stays bounded, meets no dead end, and is the goal alone in the end."""
+        events = dead_end_events(self.path)
+        deadline = time.process_time() + time_limit
+        limit = float(self.problem.half_ranges[0] + SPREAD)
+        for width in (COARSEST >> k for k in range(rounds)):
+            left = deadline - time.process_time()
+            tube = Flood(self.path, limit, width=width, depth=DEPTH, until=left).run()
+            jams = [self._dead_end(e) for e in events if tube.meets(e.s, e.first, e.last)]
+            alone = tube.closed and self._alone(tube)
+            self._record(tube, jams, len(events), alone)
+            sure = any(jam.witness is not None for jam in jams)
+            if sure or (alone and not jams) or time.process_time() > deadline:
+                break
+        self._conclude(tube, jams, alone)
+
+    def _record(self, tube: Tube, jams: list[DeadEnd], listed: int, alone: bool) -> None:
+        assert_cages = self.cages or Cages(half_ranges=self.problem.half_ranges, knot_ranges=np.empty((0, 2)))
+        self.cages = replace(
+            assert_cages,
+            samples=np.array([(slab.low, slab.high) for slab in tube.slabs]).reshape(-1, 2),
+            ranges=np.array([slab.range for slab in tube.slabs]).reshape(-1, 2),
+            leak=tube.leak,
+        )
+        self.dead_ends = DeadEnds(
+            verdict="no_jam" if tube.closed and not jams else "may_jam", events=tuple(jams), listed=listed
+        )
+        if self.end is not None:
+            self.end = replace(self.end, alone=alone)
+
+    def _conclude(self, tube: Tube, jams: list[DeadEnd], alone: bool) -> None:
+        """State what is refuted or in doubt."""
+        if tube.leak is not None:
+            low, high = tube.leak
+            report = verify_cage(self.path.arrangement(0.5 * (low + high)))
+            if report.verdict == "escapes":
+                self.refuted.append(f"the object can escape at s = {0.5 * (low + high):.6g}")
+            else:
+                self.doubts.append(f"what can be reached may be unbounded for s in [{low:.6g}, {high:.6g}]")
+        if any(jam.witness is not None for jam in jams):
+            self.refuted.append("a start in Q0 jams")
+        elif jams:
+            self.doubts.append(f"a dead end at s = {jams[0].s:.6g} is not shown to be out of reach")
+        elif tube.leak is None and not alone:
+            self.doubts.append("something else than the goal may be left at the end")
+
+    def _alone(self, tube: Tube) -> bool:
+        """Whether the contacts exclude everything but the goal among what can be reached at the end."""
+        flood = Flood(self.path, np.pi, width=FINEST, depth=0)
+        last = flood.slab(tube.slabs[-1], self.path.last, self.path.last, FINEST)
+        return last is not None and self.isolation.holds_in(last.shift, *last.range)
+
+    def _dead_end(self, event: DeadEndEvent) -> DeadEnd:
+        places = event.configurations(9)
+        poses = self.path.frame.world_pose(places)
+        untouched = self.path.deepest(places, 0.0, event.s) <= TOUCH
+        known = self.start.contains(poses) if self.start else np.zeros(len(poses), bool)
+        sure = np.flatnonzero(untouched & known)
+        pose = poses[sure[0]] if len(sure) else poses[len(poses) // 2]
+        return DeadEnd(s=event.s, pose=pose, contacts=event.contacts, witness=pose if len(sure) else None)
+
+
+def _gripper_fault(problem: GraspProblem, fingers: Array) -> str:
+    """Which gripper cannot hold its fingers (N, 2) there; empty if all can."""
+    tolerance = 1e-6 * problem.shape.size
+    for k, gripper in enumerate(problem.grippers):
+        i, j = gripper.fingers
+        opening = float(np.linalg.norm(fingers[j] - fingers[i]))
+        least, most = gripper.opening
+        if not least - tolerance <= opening <= most + tolerance:
+            return f"gripper {k} opens by {opening:.4g} m, outside [{least:g}, {most:g}]"
+    return ""
