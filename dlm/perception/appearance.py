@@ -3,9 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 
 from datasets.render import Camera, Frames, ground_coverage
 from expert.errors import InvalidProblem
+from expert.geometry.polygon import NDArrayBool
 from expert.geometry.pose import Array
 
 LEAST_NOISE = 0.5
@@ -47,8 +49,19 @@ def separate(video: Frames, camera: Camera, floor: bool) -> Appearance:
     off = np.linalg.norm(plain - background - share[..., None] * line, axis=-1) * light
     contrast = light * np.sqrt(length)
     precision = 1 / ((noise / contrast) ** 2 + MODEL_ERROR**2)
-    foreign = off > max(6 * noise, FOREIGN)
+    foreign = (off > max(6 * noise, FOREIGN)) | _half_covered_areas(share, noise / contrast)
     return Appearance(share, np.broadcast_to(precision, share.shape), foreign, noise, contrast)
+
+
+def _half_covered_areas(share: Array, deviation: Array) -> NDArrayBool:
+    """Areas of one colour between background and object, or beyond the object's: nothing that an outline makes."""
+    lowest, highest, mean = (
+        f(share, size=(1, 3, 3))
+        for f in (ndimage.minimum_filter, ndimage.maximum_filter, ndimage.uniform_filter)
+    )
+    flat = highest - lowest < 0.1 + 5 * deviation
+    odd = flat & (np.abs(mean - np.clip(np.rint(mean), 0, 1)) > 0.12 + deviation)
+    return np.asarray(ndimage.binary_dilation(odd, np.ones((1, 3, 3))))
 
 
 def _background(images: Array, ground: Array) -> tuple[Array, Array, float]:
@@ -84,7 +97,9 @@ def _background(images: Array, ground: Array) -> tuple[Array, Array, float]:
     even = sample / np.broadcast_to(light, known.shape)[known][:, None]
     colours = [np.median(even[near & (region == k)], axis=0) for k in range(len(regions))]
     background = colours[0] + ground[..., None] * (colours[-1] - colours[0])
-    off = (sample - (even * 0 + np.array(colours)[region]) * np.broadcast_to(light, known.shape)[known][:, None])[near]
+    off = (
+        sample - (even * 0 + np.array(colours)[region]) * np.broadcast_to(light, known.shape)[known][:, None]
+    )[near]
     noise = 1.4826 * float(np.median(np.abs(off - np.median(off, axis=0))))
     return light, background, max(noise, LEAST_NOISE)
 

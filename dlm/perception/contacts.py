@@ -11,7 +11,7 @@ from expert.geometry.pose import Array
 ITERATIONS = 12
 SIGNIFICANT = 3.0
 """A gap or slip of so many standard deviations is one."""
-RENDERING = 0.03
+RENDERING = 0.01
 """Standard deviation of an outline's place beyond what pixel noise explains [pixels]."""
 
 

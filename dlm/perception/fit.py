@@ -7,10 +7,15 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from dlm.perception.raster import coverage
+from expert.geometry.polygon import NDArrayBool
 from expert.geometry.pose import Array, rotation
 
 LONGEST_STEP = 1.0
 """No vertex moves further than this in one iteration [pixels]: the outline sees only the pixels that it crosses."""
+
+
+FAR = 0.3
+"""Errors of coverage beyond this and the noise are due to something else than the outline."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,10 @@ class Scene:
         motion = self.motion.copy()
         motion[1:] += step[count:].reshape(-1, 3)
         return replace(self, vertices=self.vertices + step[:count].reshape(-1, 2), motion=motion)
+
+    def seen_from_first_step(self) -> "Scene":
+        """The same scene, described by the vertices' places at step 0."""
+        return Scene(self.placed()[0], self.motion - self.motion[0], self.centre + self.motion[0, :2])
 
     def derivative(self) -> Array:
         """Of placed vertices with respect to all parameters: vertices, then motion[1:]; (T, V, 2, 2 V + 3 (T - 1))."""
@@ -86,6 +95,21 @@ def modelled(scene: Scene, seen: Observation) -> tuple[Array, Array]:
             share = gaussian_filter1d(share, seen.blur, axis=axis)
             gradient = gaussian_filter1d(gradient, seen.blur, axis=axis)
     return share, gradient
+
+
+def crossed(scene: Scene, seen: Observation) -> tuple[Array, NDArrayBool]:
+    """Weighted squares of the errors (T, h, w), and which pixels with a weight the outline crosses."""
+    share, gradient = modelled(scene, seen)
+    edge = (np.abs(gradient).sum(axis=(-1, -2)) > 1e-9) & (seen.weight > 0)
+    return seen.weight * (share - seen.share) ** 2, edge
+
+
+def without_outliers(scene: Scene, seen: Observation) -> Observation:
+    """The observation without the pixels that the scene is far from explaining, as where something hides the object."""
+    share, _ = modelled(scene, seen)
+    error = np.abs(share - seen.share)
+    far = error > FAR + 4 / np.sqrt(np.maximum(seen.weight, 1e-12))
+    return replace(seen, weight=np.where(far, 0.0, seen.weight))
 
 
 def quadratic(scene: Scene, seen: Observation) -> Quadratic:

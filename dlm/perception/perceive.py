@@ -5,14 +5,19 @@ import numpy as np
 from datasets.render import Camera, Frames
 from dlm.perception.appearance import Appearance, separate
 from dlm.perception.contacts import snap_contacts
-from dlm.perception.fit import Observation, Scene
+from dlm.perception.fit import Observation, Scene, fit, without_outliers
 from dlm.perception.prune import boundary_variance, prune
 from dlm.perception.segment import Windows, segment
-from dlm.perception.start import first_scene
+from dlm.perception.start import clearest_frames, first_scene
 from dlm.perception.types import Perceived, PerceptionSettings
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import mass_properties
 from expert.geometry.pose import Array, to_body
+
+
+STARTS = 3
+POOR = 9.0
+"""Mean square of the errors over that of the noise beyond which another start is tried."""
 
 
 def perceive(
@@ -27,10 +32,28 @@ def perceive(
     look = separate(video, camera, settings.floor)
     windows = segment(look)
     seen = _observation(look, windows, settings)
-    scene, _ = prune(first_scene(seen, settings.most_vertices), seen)
+    scene, seen = _best_start(seen, settings)
+    scene, _ = prune(scene, seen)
     if settings.floor:
         scene, _ = snap_contacts(scene, seen, camera.below / camera.scale, settings.snap)
     return _answer(scene, seen, camera, look)
+
+
+def _best_start(seen: Observation, settings: PerceptionSettings) -> tuple[Scene, Observation]:
+    """Fitted from the clearest frame's outline, or from another where that explains the video much better."""
+    best, least = None, np.inf
+    for reference in clearest_frames(seen)[:STARTS]:
+        scene = first_scene(seen, int(reference), settings.most_vertices)
+        trusted = without_outliers(scene, seen)
+        scene, _ = fit(scene, trusted)
+        _, error = boundary_variance(scene, seen)
+        if error < least:
+            best, least = (scene, trusted), error
+        if error < POOR:
+            break
+    if best is None:
+        raise RuntimeError("no start was tried")
+    return best
 
 
 def check_video(video: Frames, camera: Camera) -> None:

@@ -1,11 +1,14 @@
 """Where the fit starts: an outline with more corners than needed, and the object's turn from frame to frame."""
 
+from collections.abc import Iterable
+from dataclasses import replace
+
 import contourpy
 import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from dlm.perception.fit import Observation, Scene, fit
+from dlm.perception.fit import Observation, Scene, crossed, fit
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
 
@@ -13,26 +16,52 @@ HARMONICS = 16
 ANGLES = 720
 RIVALS = 3
 """Turns that are tried in each frame."""
+SMOOTH = 0.5
+"""Blur under which the first outline is drawn [pixels]."""
+BAD_FRAME = 9.0
+"""A frame is aligned again where its errors' mean square exceeds that of the typical frame so many times."""
 
 
-def first_scene(seen: Observation, most_vertices: int) -> Scene:
-    """Outline of frame 0 and a rough motion."""
-    outline = outline_of(seen.share[0], most_vertices, smooth=0.5) + seen.origins[0]
-    centres = np.array([_centre(share) for share in seen.share]) + seen.origins
-    motion = np.zeros((len(centres), 3))
-    motion[:, :2] = centres - centres[0]
-    scene = Scene(outline, motion, centres[0])
-    spectra = [_harmonics(share, c) for share, c in zip(seen.share, centres - seen.origins, strict=True)]
-    for t in range(1, len(centres)):
-        scene = _turned(scene, seen, t, _turns(spectra[0], spectra[t]))
-    return scene
+def first_scene(seen: Observation, reference: int, most_vertices: int) -> Scene:
+    """Outline as seen in frame `reference`, and the motion, fitted together."""
+    shares = _filled(seen)
+    outline = outline_of(shares[reference], most_vertices) + seen.origins[reference]
+    centres = np.array([_centre(share) for share in shares])
+    spectra = [_harmonics(share, centre) for share, centre in zip(shares, centres, strict=True)]
+    middles = centres + seen.origins
+    motion = np.zeros((len(shares), 3))
+    motion[:, :2] = middles - middles[reference]
+    scene = Scene(outline, motion, middles[reference])
+    steps = len(shares)
+    for order in (range(reference + 1, steps), range(reference - 1, -1, -1)):
+        for t in order:
+            nearest = motion[t - 1 if t > reference else t + 1, 2]
+            motion[t] = _aligned(scene, seen, t, _turns(spectra[reference], spectra[t]), nearest)
+    scene, _ = fit(scene.seen_from_first_step(), seen)
+    return _realigned(scene, seen)
 
 
-def outline_of(share: Array, most_vertices: int, smooth: float) -> Array:
+def clearest_frames(seen: Observation) -> Array:
+    """Frames in order of how much of the object is hidden, the least first."""
+    return np.argsort((seen.weight == 0).sum(axis=(1, 2)), kind="stable")
+
+
+def _filled(seen: Observation) -> Array:
+    """Shares with the pixels that tell nothing painted over from around them."""
+    out = seen.share.copy()
+    for t in np.flatnonzero((seen.weight == 0).any(axis=(1, 2))):
+        levels = np.clip(np.rint(255 * out[t]), 0, 255).astype(np.uint8)
+        hidden = (seen.weight[t] == 0).astype(np.uint8)
+        painted = cv2.inpaint(levels, hidden, 3, cv2.INPAINT_TELEA) / 255
+        out[t] = np.where(hidden, painted, out[t])
+    return out
+
+
+def outline_of(share: Array, most_vertices: int) -> Array:
     """Counter-clockwise polygon (V, 2) along the level of one half, in pixels from the window's corner."""
     height, width = share.shape
     level = contourpy.contour_generator(
-        x=np.arange(width) + 0.5, y=np.arange(height) + 0.5, z=gaussian_filter(share, smooth)
+        x=np.arange(width) + 0.5, y=np.arange(height) + 0.5, z=gaussian_filter(share, SMOOTH)
     )
     lines = [np.asarray(line) for line in level.lines(0.5)]
     if not lines:
@@ -58,9 +87,13 @@ def _area(points: Array) -> float:
 
 
 def _centre(share: Array) -> Array:
-    mass = np.where(share > 0.25, np.clip(share, 0, 1), 0)
+    mass = _mass(share)
     y, x = np.indices(share.shape) + 0.5
     return np.array([(mass * x).sum(), (mass * y).sum()]) / mass.sum()
+
+
+def _mass(share: Array) -> Array:
+    return np.where(share > 0.25, np.clip(share, 0, 1), 0)
 
 
 def _harmonics(share: Array, centre: Array) -> Array:
@@ -68,9 +101,9 @@ def _harmonics(share: Array, centre: Array) -> Array:
     y, x = np.indices(share.shape) + 0.5
     z = (x - centre[0]) + 1j * (y - centre[1])
     radius = np.abs(z)
-    mass = np.where(share > 0.25, np.clip(share, 0, 1), 0) * radius**2
     unit = np.conj(z) / np.maximum(radius, 1e-9)
-    return np.array([(mass * unit**k).sum() for k in range(1, HARMONICS + 1)])
+    powers = unit[..., None] ** np.arange(1, HARMONICS + 1)
+    return np.asarray(np.tensordot(_mass(share) * radius**2, powers, axes=2))
 
 
 def _turns(before: Array, after: Array) -> Array:
@@ -78,27 +111,42 @@ def _turns(before: Array, after: Array) -> Array:
     spectrum = np.zeros(ANGLES, dtype=complex)
     spectrum[1 : HARMONICS + 1] = after * np.conj(before)
     match = np.fft.ifft(spectrum).real
-    peak = (match >= np.roll(match, 1)) & (match > np.roll(match, -1))
-    peaks = np.flatnonzero(peak)
+    peaks = np.flatnonzero((match >= np.roll(match, 1)) & (match > np.roll(match, -1)))
     best = peaks[np.argsort(match[peaks])[::-1]]
     return 2 * np.pi / ANGLES * best[match[best] > 0.6 * match.max()][:RIVALS]
 
 
-def _turned(scene: Scene, seen: Observation, t: int, turns: Array) -> Scene:
-    """The scene with frame t aligned: of equally good turns the one nearest to the frame before."""
-    last = scene.motion[t - 1, 2]
-    near = last + np.mod(turns - last + np.pi, 2 * np.pi) - np.pi
-    pair = Observation(seen.share[[0, t]], seen.weight[[0, t]], seen.origins[[0, t]], seen.blur)
-    pose = slice(scene.vertices.size, None)
+def _aligned(scene: Scene, seen: Observation, t: int, turns: Iterable[float], nearest: float) -> Array:
+    """Pose (3,) of frame t; of equally good turns the one next to the angle `nearest`."""
+    one = Observation(seen.share[[t, t]], seen.weight[[t, t]], seen.origins[[t, t]], seen.blur)
+    near = nearest + np.mod(np.asarray(turns) - nearest + np.pi, 2 * np.pi) - np.pi
     trials = []
-    for angle in near[np.argsort(np.abs(near - last))]:
-        motion = np.array([scene.motion[0], [*scene.motion[t, :2], angle]])
-        aligned, value = fit(
-            Scene(scene.vertices, motion, scene.centre), pair, iterations=12, free=pose, precision=1e-3
-        )
-        trials.append((value.cost, aligned.motion[1]))
+    for angle in near[np.argsort(np.abs(near - nearest))]:
+        # Step 0 stands still: its residual is the same in all trials.
+        guess = replace(scene, motion=np.array([scene.motion[t], [*scene.motion[t, :2], angle]]))
+        pose = slice(scene.vertices.size, None)
+        found, value = fit(guess, one, iterations=12, free=pose, precision=1e-3)
+        trials.append((value.cost, found.motion[1]))
     least = min(cost for cost, _ in trials)
-    chosen = next(motion for cost, motion in trials if cost <= 1.02 * least + 10)
-    motions = scene.motion.copy()
-    motions[t] = chosen
-    return Scene(scene.vertices, motions, scene.centre)
+    return next(motion for cost, motion in trials if cost <= 1.02 * least + 10)
+
+
+def _realigned(scene: Scene, seen: Observation) -> Scene:
+    """Frames that fit much worse than the others are aligned again, from all directions."""
+    everywhere = np.arange(16) * (np.pi / 8)
+    for _ in range(2):
+        worth = frame_errors(scene, seen)
+        bad = np.flatnonzero(worth > BAD_FRAME * max(1.0, float(np.median(worth))))
+        if not len(bad):
+            break
+        motion = scene.motion.copy()
+        for t in bad[bad > 0]:
+            motion[t] = _aligned(scene, seen, int(t), everywhere, motion[t - 1, 2])
+        scene, _ = fit(replace(scene, motion=motion), seen)
+    return scene
+
+
+def frame_errors(scene: Scene, seen: Observation) -> Array:
+    """Mean weighted square of the errors of the pixels that the outline crosses, per frame (T,); 1 is noise alone."""
+    squares, edge = crossed(scene, seen)
+    return np.array([s[e].mean() if e.any() else 0.0 for s, e in zip(squares, edge, strict=True)])
