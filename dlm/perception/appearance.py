@@ -71,19 +71,19 @@ def _background(images: Array, ground: Array) -> tuple[Array, Array, float]:
     pixels of either; what is neither (the object, something in front) differs in hue or brightness and is left out.
     """
     basis = _smooth_basis(*ground.shape)
-    regions = [region for region in (ground == 0, ground == 1) if region.any()]
-    terms = np.stack([region[..., None] for region in regions], axis=-2)[..., 0]
-    design = np.concatenate([terms.astype(float), basis], axis=-1)
+    regions = np.stack([region for region in (ground == 0, ground == 1) if region.any()], axis=-1)
+    count = regions.shape[-1]
+    design = np.concatenate([regions.astype(float), basis], axis=-1)
     known = np.zeros(images.shape[:3], dtype=bool)
-    known[:, 1::CANDIDATES, ::CANDIDATES] = (terms.any(axis=-1))[1::CANDIDATES, ::CANDIDATES]
+    known[:, 1::CANDIDATES, ::CANDIDATES] = regions.any(axis=-1)[1::CANDIDATES, ::CANDIDATES]
     sample, where = images[known], np.broadcast_to(design, (*known.shape, design.shape[-1]))[known]
-    region = where[:, : len(regions)].argmax(axis=-1)
+    region = where[:, :count].argmax(axis=-1)
     brightness = np.maximum(sample.sum(axis=-1), 1.0)
     hue = sample / brightness[:, None]
-    typical = np.array([np.median(hue[region == k], axis=0) for k in range(len(regions))])
+    typical = np.array([np.median(hue[region == k], axis=0) for k in range(count)])
     tinted = np.linalg.norm(hue - typical[region], axis=-1) * brightness
     inside = tinted < 3 * np.median(tinted) + 3
-    level = np.array([np.median(brightness[region == k]) for k in range(len(regions))])
+    level = np.array([np.median(brightness[region == k]) for k in range(count)])
     rest = np.log(brightness) - np.log(level[region])
     for _ in range(6):
         spread = 1.4826 * np.median(np.abs(rest[inside]))
@@ -93,9 +93,9 @@ def _background(images: Array, ground: Array) -> tuple[Array, Array, float]:
         matrix = where.T @ (weight[:, None] * where) + 1e-6 * np.eye(design.shape[-1])
         surface = np.linalg.solve(matrix, where.T @ (weight * np.log(brightness)))
         rest = np.log(brightness) - where @ surface
-    light = np.exp(np.clip(basis @ surface[len(regions) :], -1.5, 1.5))
+    light = np.exp(np.clip(basis @ surface[count:], -1.5, 1.5))
     even = sample / np.broadcast_to(light, known.shape)[known][:, None]
-    colours = [np.median(even[near & (region == k)], axis=0) for k in range(len(regions))]
+    colours = [np.median(even[near & (region == k)], axis=0) for k in range(count)]
     background = colours[0] + ground[..., None] * (colours[-1] - colours[0])
     off = (
         sample - (even * 0 + np.array(colours)[region]) * np.broadcast_to(light, known.shape)[known][:, None]

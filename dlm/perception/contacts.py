@@ -11,8 +11,8 @@ from expert.geometry.pose import Array
 ITERATIONS = 12
 SIGNIFICANT = 3.0
 """A gap or slip of so many standard deviations is one."""
-RENDERING = 0.01
-"""Standard deviation of an outline's place beyond what pixel noise explains [pixels]."""
+SYSTEMATIC_GAP, SYSTEMATIC_SLIP = 0.01, 0.02
+"""Standard deviations of a vertex's height and place along the floor beyond what pixel noise explains [pixels]."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,11 @@ class Contact:
     step: int
     vertex: int
     sticks: bool = False
+
+    @property
+    def systematic(self) -> float:
+        """What is left of its gap or slip without pixel noise [pixels]."""
+        return SYSTEMATIC_SLIP if self.sticks else SYSTEMATIC_GAP
 
 
 def snap_contacts(scene: Scene, seen: Observation, floor: float, reach: float) -> tuple[Scene, list[Contact]]:
@@ -48,7 +53,7 @@ def _settle(
             continue
         excess = np.array(
             [
-                (abs(x) if c.sticks else x) / np.hypot(s, RENDERING)
+                (abs(x) if c.sticks else x) / np.hypot(s, c.systematic)
                 for c, x, s in zip(contacts, free, deviation, strict=True)
             ]
         )
@@ -123,7 +128,8 @@ def _insignificant(
 ) -> list[Contact]:
     """Those whose gap or slip is small and not significant."""
     values, slopes = _constraints(scene, contacts, floor)
-    deviation = np.sqrt(np.einsum("kn,nm,km->k", slopes, covariance, slopes) + RENDERING**2)
+    systematic = np.array([c.systematic for c in contacts])
+    deviation = np.sqrt(np.einsum("kn,nm,km->k", slopes, covariance, slopes) + systematic**2)
     size = np.where([c.sticks for c in contacts], np.abs(values), values)
     return [
         c

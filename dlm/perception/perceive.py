@@ -14,7 +14,6 @@ from expert.errors import InvalidProblem
 from expert.geometry.polygon import mass_properties
 from expert.geometry.pose import Array, to_body
 
-
 STARTS = 3
 POOR = 9.0
 """Mean square of the errors over that of the noise beyond which another start is tried."""

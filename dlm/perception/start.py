@@ -11,6 +11,7 @@ from scipy.ndimage import gaussian_filter
 from dlm.perception.fit import Observation, Scene, crossed, fit
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
+from expert.types import IntArray
 
 HARMONICS = 16
 ANGLES = 720
@@ -41,7 +42,7 @@ def first_scene(seen: Observation, reference: int, most_vertices: int) -> Scene:
     return _realigned(scene, seen)
 
 
-def clearest_frames(seen: Observation) -> Array:
+def clearest_frames(seen: Observation) -> IntArray:
     """Frames in order of how much of the object is hidden, the least first."""
     return np.argsort((seen.weight == 0).sum(axis=(1, 2)), kind="stable")
 
