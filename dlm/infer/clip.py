@@ -17,7 +17,6 @@ os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
 import cv2
 
 
-
 @dataclass(frozen=True, kw_only=True)
 class Clip:
     """frames (n, height, width, 3) uint8 RGB, at times (n,) [s], the first at 0; n >= 2."""

@@ -15,9 +15,10 @@ from dlm.perception import Perceived, PerceptionSettings, perceive
 from dlm.simulator import SimulatorSettings
 from dlm.simulator.replay import Replay, replay
 from dlm.structured import ExpertPlanner, Planned, StructuredModel
+from expert.errors import InvalidProblem
+from expert.files import problem_of
 from expert.files.contact_plan import answer_fields
 from expert.files.contact_task import task_fields
-from expert.files import problem_of
 from expert.geometry.polygon import diameter
 from expert.types import ContactTask, Plan, require
 
@@ -98,7 +99,8 @@ class Inference:
 
     def solution(self) -> dict[str, Any]:
         """Actions as a solution file, which `python -m expert verify|draw` and `python -m dlm.simulator` read."""
-        require(self.plan is not None and self.task is not None, "plan", "a plan", self.reason)
+        if self.plan is None or self.task is None:
+            raise InvalidProblem("plan", expected="a plan", got=f"none: {self.reason}")
         data = task_fields(self.task, description="perceived in a video")
         answer = answer_fields(problem_of(data), self.plan)
         return {"schema": 1, "solution": "contact_trajectory", "problem": data, **answer}
@@ -125,7 +127,9 @@ def infer(
     require(refine in (None, "expert"), "refine", "expert or nothing", refine)
     model = model or StructuredModel()
     steps = model.planning.tasks.steps
-    clip = video if isinstance(video, Clip) else read_clip(video, steps=steps, start=start, end=end, rate=rate)
+    clip = (
+        video if isinstance(video, Clip) else read_clip(video, steps=steps, start=start, end=end, rate=rate)
+    )
     view, seen = look(clip, scene, segmentation or Segmentation(), model.perception)
     planning = replace(model.planning, tasks=tasks_of(model.planning.tasks, scene, clip))
     by_model = replace(model, planning=planning)
@@ -156,16 +160,18 @@ def look(
     return view.scaled(factor), scaled(seen, factor)
 
 
-def simplified(seen: Perceived, tolerance: float) -> Perceived:
-    """Without corners that change the outline by less than `tolerance` [m].
+def simplified(seen: Perceived, detail: float) -> Perceived:
+    """Without corners that change the outline by less than `detail` [m], nor spikes twice as thin.
 
     Compression leaves errors along the outline that are no noise to perception, which explains them by needless corners, some
     of them in knots.
     """
-    whole = max(shapely.get_parts(shapely.Polygon(seen.vertices).buffer(0)), key=shapely.area)
-    plain = shapely.geometry.polygon.orient(whole.simplify(tolerance))
+    whole = shapely.Polygon(seen.vertices).buffer(0)
+    open_ = whole.buffer(-detail, join_style="mitre").buffer(detail, join_style="mitre")
+    largest = max(shapely.get_parts(whole if open_.is_empty else open_), key=shapely.area)
+    plain = shapely.geometry.polygon.orient(largest.simplify(detail))
     vertices = np.array(plain.exterior.coords)[:-1]
-    low = np.flatnonzero(vertices[:, 1] < vertices[:, 1].min() + tolerance)
+    low = np.flatnonzero(vertices[:, 1] < vertices[:, 1].min() + detail)
     first = int(low[vertices[low, 0].argmin()])
     return replace(seen, vertices=np.roll(vertices, -first, axis=0))
 

@@ -117,14 +117,16 @@ def _find_object(frames: Frames, floor: float) -> tuple[float, float, float, flo
 def _cut(frame: Frames, x: int, y: int, side: int) -> Frames:
     """A square of the frame; beyond the frame its border goes on, so that what touches it still touches the square's."""
     height, width = frame.shape[:2]
-    pad = [max(0, -y), max(0, y + side - height), max(0, -x), max(0, x + side - width)]
-    wide = cv2.copyMakeBorder(frame, *pad, cv2.BORDER_REPLICATE)
-    return wide[y + pad[0] : y + pad[0] + side, x + pad[2] : x + pad[2] + side]
+    rows = np.clip(np.arange(y, y + side), 0, height - 1)
+    columns = np.clip(np.arange(x, x + side), 0, width - 1)
+    return frame[rows[:, None], columns]
 
 
 def _resized(frame: Frames, size: int) -> Frames:
     """Every pixel the mean of what it covers."""
-    return frame if len(frame) == size else cv2.resize(frame, (size, size), interpolation=cv2.INTER_AREA)
+    if len(frame) == size:
+        return frame
+    return np.asarray(cv2.resize(frame, (size, size), interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
 def lowest_row(frames: Frames) -> float:
