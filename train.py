@@ -7,6 +7,7 @@ import copy
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -33,7 +34,7 @@ def main(cfg: DictConfig) -> None:
     require(isinstance(cfg.jobs, int) and cfg.jobs >= 1, "jobs", "a number of processes", cfg.jobs)
     runs = [of_seed(cfg, seed) for seed in seeds]
     stages = list(stages_of(cfg).values())
-    tasks = read_all(cfg.data)
+    tasks = read_tasks(cfg)
     if cfg.jobs == 1:
         for run in runs:
             for stage in stages:
@@ -56,6 +57,17 @@ def stages_of(cfg: DictConfig) -> dict[str, Stage]:
     return {name: instantiate(node, _convert_="object") for name, node in cfg.stages.items()}
 
 
+def read_tasks(cfg: DictConfig) -> dict[str, TaskBatch]:
+    """All data sets; of the training set the first `train_tasks`, if that is a number."""
+    tasks = read_all(cfg.data)
+    if cfg.train_tasks is not None:
+        total = len(tasks["train"])
+        fits = isinstance(cfg.train_tasks, int) and 2 <= cfg.train_tasks <= total
+        require(fits, "train_tasks", f"a whole number from 2 to {total}", cfg.train_tasks)
+        tasks["train"] = tasks["train"][torch.arange(cfg.train_tasks)]
+    return tasks
+
+
 def train_side_by_side(cfg: DictConfig, runs: Sequence[DictConfig], stages: Sequence[Stage]) -> None:
     """Train several stages of several seeds at a time, the longest chains of stages first."""
     rows = [(run, chain) for chain in chains(stages) for run in runs]
@@ -75,14 +87,14 @@ def train_side_by_side(cfg: DictConfig, runs: Sequence[DictConfig], stages: Sequ
 
 def train_chain(cfg: DictConfig, names: Sequence[str]) -> list[str]:
     """Stages of one seed in order, in a process of their own."""
-    tasks, stages = read_all(cfg.data), stages_of(cfg)
+    tasks, stages = read_tasks(cfg), stages_of(cfg)
     return [train_stage(cfg, stages[name], tasks) for name in names]
 
 
 def train_stage(cfg: DictConfig, stage: Stage, tasks: dict[str, TaskBatch]) -> str:
     """One stage, from fresh weights or from those of its warm start; a line that says where it is."""
     torch.set_num_threads(cfg.threads)
-    schedule = instantiate(cfg.schedule)
+    schedule = replace(instantiate(cfg.schedule), **stage.schedule)
     model = instantiate(cfg.model, _convert_="object")
     policy = model.build(stage.policy, instantiate(cfg.solver), seed=cfg.seed)
     policy.fit_centre(tasks["train"])
@@ -134,7 +146,7 @@ def iterations_done(runs: Sequence[DictConfig], stages: Sequence[Stage], start: 
 def settings(cfg: DictConfig, stage: Stage) -> dict[str, object]:
     """All that a stage's steps depend on, as plain values; enough to rebuild the policy."""
     plain = OmegaConf.to_container(cfg, resolve=True)
-    chosen = {key: plain[key] for key in ("model", "solver", "schedule", "seed")}
+    chosen = {key: plain[key] for key in ("model", "solver", "schedule", "seed", "train_tasks")}
     return {**chosen, "stage": plain["stages"][stage.name]}
 
 

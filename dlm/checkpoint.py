@@ -22,6 +22,9 @@ from expert.errors import InvalidProblem
 SCHEMA = 1
 PACKAGES = ("certified-manipulation", "torch", "numpy", "cvxpy", "cvxpylayers", "diffcp", "clarabel", "numba")
 
+OWN = ("dlm.", "datasets.")
+"""Packages whose classes a checkpoint may name."""
+
 
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that decide the numbers."""
@@ -112,10 +115,10 @@ def read_about(path: Path, *, command: str) -> About:
 
 
 def _require_own_classes(settings: object, path: Path) -> None:
-    """Settings may name classes to build: only this package's, or a file from elsewhere could run anything."""
+    """Settings may name classes to build: only those of our packages, or a file from elsewhere could run anything."""
     if isinstance(settings, Mapping):
         target = settings.get("_target_", "dlm.")
-        if not str(target).startswith("dlm."):
+        if not str(target).startswith(OWN):
             raise InvalidProblem(f"checkpoint {path}", expected="classes of dlm", got=f"{target}"[:60])
         for value in settings.values():
             _require_own_classes(value, path)

@@ -12,10 +12,11 @@ from torch import Tensor
 from dlm.execution import simulate
 from dlm.inverse_dynamics import Action
 from dlm.metrics import finger_trajectory_loss, object_trajectory_loss
-from dlm.models import Policy
+from dlm.models import DerenderingPolicy, Policy
 from dlm.parameters import Layout, ParameterBatch
 from dlm.simulator import SimulatorSettings
 from dlm.tasks import TaskBatch
+from expert.errors import InvalidProblem
 
 Loss = Callable[[Policy, TaskBatch], Tensor]
 
@@ -49,6 +50,8 @@ class ParameterLoss:
     """4-CT5, for MDR."""
 
     def __call__(self, policy: Policy, tasks: TaskBatch) -> Tensor:
+        if not isinstance(policy, DerenderingPolicy):
+            raise InvalidProblem("stage.loss", expected="a policy that derenders", got=type(policy).__name__)
         rows = policy.derenderer(tasks.video)
         return parameter_distance(rows, tasks.parameters, policy.derenderer.layout)
 

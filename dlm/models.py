@@ -7,7 +7,7 @@ from (losses.py, configs/stage).  Every policy gives the same action, finger pos
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 import torch
 from torch import Tensor, nn
@@ -18,17 +18,15 @@ from dlm.parameters import Layout
 from dlm.tasks import TaskBatch
 from expert.types import require
 
-Kind = Literal["perceptron", "program"]
+Kind = Literal["perceptron", "program", "regressor", "best_guess", "proposals"]
+"""The first two belong to `model: thesis`, the others to `model: structured`."""
 
 
 class Policy(nn.Module):
     """From videos (b, t, h, w, 3), uint8, to actions."""
 
-    derenderer: Derenderer
-
     def fit_centre(self, tasks: TaskBatch) -> None:
-        """Let the untrained network answer with the average task of a training set."""
-        self.derenderer.fit_centre(tasks.parameters)
+        """Let the untrained policy answer with the average task of a training set, where it learns deviations from it."""
 
     def weights(self) -> dict[str, Tensor]:
         """What was learned, and what it was scaled by; the constants of a program are neither."""
@@ -38,7 +36,16 @@ class Policy(nn.Module):
         return super().__call__(video)
 
 
-class PerceptronPolicy(Policy):
+class DerenderingPolicy(Policy):
+    """A policy that begins with a derenderer."""
+
+    derenderer: Derenderer
+
+    def fit_centre(self, tasks: TaskBatch) -> None:
+        self.derenderer.fit_centre(tasks.parameters)
+
+
+class PerceptronPolicy(DerenderingPolicy):
     """NN, NNM: a perceptron takes the place of the program.  Its input has the form of P*, but no label gives it a meaning."""
 
     centre: Tensor
@@ -68,7 +75,7 @@ class PerceptronPolicy(Policy):
         )
 
 
-class ProgramPolicy(Policy):
+class ProgramPolicy(DerenderingPolicy):
     """MDR, CVX, DLM: the quadratic program 4-CT6 turns derendered parameters into an action."""
 
     def __init__(self, layout: Layout, sizes: NetworkSizes, program: InverseDynamics) -> None:
@@ -78,6 +85,15 @@ class ProgramPolicy(Policy):
 
     def forward(self, video: Tensor) -> Action:
         return self.program(self.derenderer.parameters_of(video))
+
+
+class Model(Protocol):
+    """What a configuration's `model` is: its name, and how to build its policies with weights drawn from a seed."""
+
+    @property
+    def name(self) -> str: ...
+
+    def build(self, kind: Kind, program: InverseDynamics, *, seed: int) -> Policy: ...
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import torch
@@ -28,13 +28,17 @@ Row = dict[str, float]
 
 @dataclass(frozen=True, kw_only=True)
 class Stage:
-    """What one stage learns by: policy, loss, data set, and the stage whose weights it starts from."""
+    """What one stage learns by: policy, loss, data set, and the stage whose weights it starts from.
+
+    schedule: what differs from the common schedule, by the names of `Schedule`.
+    """
 
     name: str
     policy: Kind
     loss: Loss
     dataset: str
     warm_start: str | None = None
+    schedule: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -47,7 +47,7 @@ def check(
 ) -> Checked:
     """The best plan with one of the mode sequences (k, T, C).  `model`: of this task, if it is there already."""
     model = model or model_of(task)
-    first = screen(model, np.ascontiguousarray(modes), GAP / 2)
+    first = screen(model, np.ascontiguousarray(modes), GAP / 2, ROUNDS, False)
     tree = Tree(model, modes.shape[2], GAP)
     best, bounds = int(first[1].argmin()), first[0]
     if np.isfinite(first[1][best]):
@@ -67,10 +67,12 @@ def _closed(cost: float, bound: float) -> bool:
 
 
 @compiled
-def screen(model: Model, modes: IntArray, gap: float) -> tuple[Array, Array, Array, Array, Array]:
+def screen(
+    model: Model, modes: IntArray, gap: float, rounds: int, everyone: bool
+) -> tuple[Array, Array, Array, Array, Array]:
     """Bounds and costs (k,) of the classes, their boxes lo, hi (k, TC) of contact positions and best points (k, 2TC).
 
-    Classes that cannot beat the best cost so far are left with a bound above it, and no cost.
+    Unless `everyone` is to get a cost, classes that cannot beat the best one so far are left with a bound above it.
     """
     N, T, C = modes.shape
     bounds, costs = np.full(N, np.inf), np.full(N, np.inf)
@@ -81,7 +83,8 @@ def screen(model: Model, modes: IntArray, gap: float) -> tuple[Array, Array, Arr
         lo, hi = sequence.lo.copy(), sequence.hi.copy()
         if (lo > hi).any() or not narrow(model, sequence, lo, hi):
             continue
-        found = relax(model, sequence, lo, hi, np.full((T, C), -1), best, gap, ROUNDS)
+        target = np.inf if everyone else best
+        found = relax(model, sequence, lo, hi, np.full((T, C), -1), target, gap, rounds)
         bounds[k], costs[k] = found.bound, found.cost
         low[k, : lo.size], high[k, : lo.size] = lo, hi
         points[k, : found.z.size] = found.z

@@ -65,9 +65,11 @@ class Example:
         rho = np.where(here, np.where(beyond, (self.rho - share) / (1 - share), self.rho / share), self.rho)
         return replace(self, vertices=np.insert(v, k + 1, corner, axis=0), modes=modes, rho=rho)
 
-    def varied(self, rng: np.random.Generator, *, splitting: bool = True) -> "Example":
+    def varied(
+        self, rng: np.random.Generator, *, splitting: bool = True, mirroring: bool = True
+    ) -> "Example":
         """Mirrored half of the time, and split half of the time."""
-        example = self.mirrored() if rng.random() < 0.5 else self
+        example = self.mirrored() if mirroring and rng.random() < 0.5 else self
         if splitting and rng.random() < 0.5 and len(example.vertices) < MOST_FACETS:
             example = example.split(rng, int(rng.integers(len(example.vertices) + 1, MOST_FACETS + 1)))
         return example

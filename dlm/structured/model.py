@@ -1,7 +1,7 @@
 """`model: structured`: video to geometry, geometry to contact classes, classes to a checked plan."""
 
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass, field, replace
+from typing import Literal, Protocol
 
 import numpy as np
 import torch
@@ -10,6 +10,7 @@ from datasets.parameters import MechanicalParameters, parameters_of
 from datasets.render import Camera, Frames
 from dlm.inverse_dynamics import Action
 from dlm.perception import Perceived, PerceptionSettings, perceive
+from dlm.structured.calibration import Calibration, deflated
 from dlm.structured.planners import Answer, ClassPlanner, Planner
 from dlm.structured.planning import Planning
 from expert.errors import InvalidProblem, SolverFailed
@@ -55,18 +56,50 @@ class Planned:
         )
 
 
+class Perceive(Protocol):
+    """`dlm.perception.perceive`, or something that remembers its answers."""
+
+    def __call__(self, video: Frames, camera: Camera, settings: PerceptionSettings) -> Perceived: ...
+
+
 @dataclass(frozen=True, kw_only=True)
 class StructuredModel:
-    """camera and perception: of `dlm.perception.perceive`; planning: margins; planner: how a plan is found."""
+    """camera and perception: as `perceive` is told; planning: margins; planner: how a plan is found; inflation: see Calibration."""
 
     camera: Camera = field(default_factory=Camera)
     perception: PerceptionSettings = field(default_factory=PerceptionSettings)
     planning: Planning = field(default_factory=Planning)
     planner: Planner = field(default_factory=ClassPlanner)
+    inflation: float = 0.0
+    perceive: Perceive = perceive
+
+    def calibrated(self, calibration: Calibration) -> "StructuredModel":
+        """With corrections, each kept to what makes sense."""
+        c, tasks, camera = calibration, self.planning.tasks, self.camera
+        planned = replace(
+            tasks,
+            facet_margin=float(np.clip(tasks.facet_margin + c.margin, 0.0, 0.45)),
+            cone_fraction=float(np.clip(tasks.cone_fraction + c.cone, 0.2, 1.0)),
+            least_push=float(np.clip(tasks.least_push + c.push, 0.0, 1.0)),
+        )
+        height = camera.size * camera.scale
+        return replace(
+            self,
+            camera=replace(
+                camera,
+                centre=camera.centre + c.shift_x,
+                below=float(np.clip(camera.below - c.shift_y, 0.0, 0.99 * height)),
+            ),
+            perception=replace(self.perception, blur=float(np.clip(self.perception.blur + c.blur, 0.0, 5.0))),
+            planning=replace(self.planning, tasks=planned),
+            inflation=self.inflation + c.inflation,
+        )
 
     def act(self, video: Frames) -> Planned:
         """Perceive and plan.  Raises InvalidProblem for a video without one object that stays in view."""
-        return self.plan(perceive(video, self.camera, self.perception))
+        below = max(self.camera.below - self.inflation, 0.0)  # the blown-up object reaches below the floor
+        seen = self.perceive(video, replace(self.camera, below=below), self.perception)
+        return self.plan(deflated(seen, self.camera.below - below))
 
     def plan(self, perceived: Perceived) -> Planned:
         """Plan for perceived geometry.  Raises InvalidProblem for another number of frames than planned for."""

@@ -4,8 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
-import numpy as np
-
 from datasets.label import Label, Labelling, label
 from dlm.structured.check import NODES, check
 from dlm.structured.classes import Schedules
@@ -66,9 +64,3 @@ class ExpertPlanner:
     def __call__(self, task: ContactTask) -> Answer:
         answer = label(task, self.labelling)
         return Answer(answer.plan, answer.task, 0) if isinstance(answer, Label) else Answer(None, task, 0)
-
-
-def ranked(classes: IntArray, scores: np.ndarray, widths: tuple[int, ...]) -> list[IntArray]:
-    """Classes by falling score in batches that end at the given ranks, and one of all the rest."""
-    order = classes[np.argsort(-scores, kind="stable")]
-    return [batch for batch in np.split(order, [w for w in widths if w < len(order)]) if len(batch)]
