@@ -16,6 +16,11 @@ MODEL_ERROR = 0.01
 """Standard deviation of what no exact coverage explains, the renderer's own errors among it [share of a pixel]."""
 FOREIGN = 25.0
 """A colour this far from every mixture of object and background is something else [grey levels]."""
+FAINTEST = 12.0
+"""Colours differ from this distance on [grey levels]."""
+FEWEST = 8
+"""Pixels that tell the object's colour."""
+CROSS = np.array([[[0, 1, 0], [1, 1, 1], [0, 1, 0]]])
 CANDIDATES = 3
 """Every so many pixels of a frame tell of background and lighting."""
 
@@ -75,11 +80,11 @@ def _background(images: Array, ground: Array) -> tuple[Array, Array, float]:
     count = regions.shape[-1]
     design = np.concatenate([regions.astype(float), basis], axis=-1)
     known = np.zeros(images.shape[:3], dtype=bool)
-    known[:, 1::CANDIDATES, ::CANDIDATES] = regions.any(axis=-1)[1::CANDIDATES, ::CANDIDATES]
+    known[:, 1::CANDIDATES, ::CANDIDATES] = np.any(regions, axis=-1)[1::CANDIDATES, ::CANDIDATES]
     sample, where = images[known], np.broadcast_to(design, (*known.shape, design.shape[-1]))[known]
     region = where[:, :count].argmax(axis=-1)
     brightness = np.maximum(sample.sum(axis=-1), 1.0)
-    hue = sample / brightness[:, None]
+    hue: Array = sample / brightness[:, None]
     typical = np.array([np.median(hue[region == k], axis=0) for k in range(count)])
     tinted = np.linalg.norm(hue - typical[region], axis=-1) * brightness
     inside = tinted < 3 * np.median(tinted) + 3
@@ -111,18 +116,20 @@ def _smooth_basis(height: int, width: int) -> Array:
 
 
 def _object_colour(plain: Array, background: Array, noise: float) -> Array:
-    """Median colour of what differs clearly from the background."""
+    """The colour that most of what differs from the background has; where something moves, of what moves."""
     difference = np.linalg.norm(plain - background, axis=-1)
-    different = difference > max(5 * noise, 12.0)
-    inner = different.copy()
-    for axis in (1, 2):
-        inner &= np.roll(different, 1, axis) & np.roll(different, -1, axis)
-    chosen = inner if inner.sum() >= 4 else different
-    if chosen.sum() < 4:
-        raise InvalidProblem(
-            "video",
-            expected="an object that stands out from its background",
-            got="background only",
-            remedy="show the object in every frame, in another colour than the background",
-        )
-    return np.median(plain[chosen], axis=0)
+    different = difference > max(5 * noise, FAINTEST)
+    inner = ndimage.binary_erosion(different, CROSS)
+    moves = np.linalg.norm(np.ptp(plain, axis=0), axis=-1) > max(8 * noise, 2 * FAINTEST)
+    for chosen in (inner & moves, inner, different):
+        if chosen.sum() >= FEWEST:
+            colours = plain[chosen][:: max(1, int(chosen.sum()) // 400)]
+            distances = np.linalg.norm(colours[:, None] - colours, axis=-1)
+            alike = distances < max(4 * noise, FAINTEST)
+            return np.median(colours[alike[alike.sum(axis=1).argmax()]], axis=0)
+    raise InvalidProblem(
+        "video",
+        expected="an object that stands out from its background",
+        got="background only",
+        remedy="show the object in every frame, in another colour than the background",
+    )
