@@ -73,6 +73,13 @@ class StructuredModel:
     inflation: float = 0.0
     perceive: Perceive = perceive
 
+    @classmethod
+    def shipped(cls, *, best_guess: bool = False) -> "StructuredModel":
+        """With the weights that come with the package; best_guess: only the likeliest contact class is checked."""
+        from dlm.structured.weights import SHIPPED, trained_model  # it builds models, from policies
+
+        return trained_model(SHIPPED, best_guess=best_guess)
+
     def calibrated(self, calibration: Calibration) -> "StructuredModel":
         """With corrections, each kept to what makes sense."""
         c, tasks, camera = calibration, self.planning.tasks, self.camera

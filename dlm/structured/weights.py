@@ -1,0 +1,41 @@
+"""Shipped weights: a checkpoint without what only training needs.
+
+`python -m dlm.structured.weights runs/large/seed_0/cvx.safetensors` makes the file of the package from a trained stage.
+"""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+
+from dlm.checkpoint import load, restore_weights
+from dlm.structured.model import StructuredModel
+from dlm.structured.policies import StructuredArchitecture
+
+SHIPPED = Path(__file__).with_name("weights.safetensors")
+COMMAND = "python train.py experiment=large"
+
+
+def trained_model(path: Path, *, best_guess: bool = False) -> StructuredModel:
+    """The model with the scorer and the calibration of a checkpoint of a stage with proposals.
+
+    best_guess: check the likeliest class alone.  Raises InvalidProblem for a missing or damaged file, and for weights of
+    another model.
+    """
+    architecture = StructuredArchitecture()
+    policy = architecture.proposer("best_guess" if best_guess else "proposals")
+    restore_weights(policy.weights(), load(path, command=COMMAND), name=architecture.name, source=path)
+    policy.eval()
+    return policy.model
+
+
+def strip(source: Path, target: Path) -> None:
+    """Copy a checkpoint without the moments of its optimiser and the state of its random generator."""
+    saved = load(source, command=COMMAND)
+    replace(saved, optimiser={}, random=torch.zeros(0, dtype=torch.uint8)).save(target)
+
+
+if __name__ == "__main__":
+    strip(Path(sys.argv[1]), SHIPPED)
+    print(f"{SHIPPED}: {SHIPPED.stat().st_size} bytes")
