@@ -1,9 +1,10 @@
-"""Cage synthesis: share found and verified, processor times, on seeded random polygons and the named shapes.
+"""Cage synthesis: share found and verified, processor times, on seeded random polygons and the named shapes; both methods.
 
-    python -m tests.benchmarks.caging [--quick] [--polygons 100] [--method swept|model] [--json FILE]
+    python -m tests.benchmarks.caging [--quick] [--polygons 100] [--method swept|model] [--thesis 20] [--json FILE]
 
 Bars: N = 3 and N = 4 on random polygons of 4-10 facets >= 98 %, median <= 0.5 s, max <= 20 s; N = 2 on 20 non-convex
 polygons >= 50 %; all named shapes with 3 and 4 fingers.  Every answer is verified once more here, after a rigid motion.
+MIP1 of the thesis then gets the first polygons again, so much time for each; its only bar is that no false cage leaves.
 """
 
 import argparse
@@ -26,7 +27,7 @@ from expert.geometry.pose import Array, to_world
 from expert.verify.cage import verify_cage
 
 SHARE_BAR, MEDIAN_BAR, MAX_BAR, PAIR_BAR = 0.98, 0.5, 20.0, 0.5
-TIME_LIMIT = 40.0
+TIME_LIMIT, PAIR_LIMIT, THESIS_LIMIT = 40.0, 4.0, 30.0
 
 
 def false_cage(problem: CageProblem, answer: CageSolution) -> bool:
@@ -45,7 +46,8 @@ def run(name: str, shapes: list[Array], count: int, method: str, limit: float) -
     """Solve for each shape and summarise."""
     console = Console(stderr=True)
     seconds, missed, false, refuted = [], [], 0, 0
-    for k, vertices in enumerate(track(shapes, name, console=console, disable=not console.is_terminal)):
+    what = f"{name}, {count} fingers, {method}"
+    for k, vertices in enumerate(track(shapes, what, console=console, disable=not console.is_terminal)):
         problem = CageProblem(shape=Shape(vertices=vertices), pose=np.zeros(3), count=count)
         began = time.process_time()
         answer = solve(problem, time_limit=limit, method=method)  # type: ignore[arg-type]
@@ -57,6 +59,7 @@ def run(name: str, shapes: list[Array], count: int, method: str, limit: float) -
             false += 1
     return {
         "case": name,
+        "method": method,
         "fingers": count,
         "objects": len(shapes),
         "verified": len(shapes) - len(missed),
@@ -65,13 +68,21 @@ def run(name: str, shapes: list[Array], count: int, method: str, limit: float) -
         "refuted_answers": refuted,
         "median_seconds": float(np.median(seconds)),
         "max_seconds": float(np.max(seconds)),
+        "seconds": seconds,
     }
+
+
+def ratio(rows: list[dict[str, Any]]) -> float:
+    """Processor time of MIP1 over that of the default method, on the polygons that both had."""
+    thesis = next(row["seconds"] for row in rows if row["method"] == "thesis")
+    default = next(row["seconds"] for row in rows if row["case"] == "random" and row["fingers"] == 3)
+    return sum(thesis) / sum(default[: len(thesis)])
 
 
 def meets_bar(row: dict[str, Any]) -> bool:
     share = row["verified"] / row["objects"]
-    if row["false_cages"]:
-        return False
+    if row["false_cages"] or row["method"] == "thesis":
+        return not row["false_cages"]
     if row["case"] == "non-convex":
         return share >= PAIR_BAR
     if row["case"] == "named":
@@ -84,30 +95,44 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="12 random polygons")
     parser.add_argument("--polygons", type=int, default=100)
     parser.add_argument("--method", default="swept", choices=("swept", "model"))
+    parser.add_argument("--thesis", type=int, default=20, help="random polygons that MIP1 gets")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
+    rows = []
+    for case in _cases(options):
+        rows.append(run(*case))
+        if options.json:
+            options.json.write_text(json.dumps({"rows": rows}, indent=1))
+    result = {"rows": rows, "thesis_over_default_time": ratio(rows)}
+    if options.json:
+        options.json.write_text(json.dumps(result, indent=1))
+    _print(result)
+    return 0 if all(meets_bar(row) for row in rows) else 1
+
+
+def _cases(options: argparse.Namespace) -> list[tuple[str, list[Array], int, str, float]]:
+    """Names, shapes, fingers, methods, time limits [s]."""
     number, limit = (12, 8.0) if options.quick else (options.polygons, TIME_LIMIT)
     polygons = [random_polygon(np.random.default_rng(k), 4 + k % 7) for k in range(number)]
     pocketed = [random_nonconvex_polygon(np.random.default_rng(k), 5 + k % 6) for k in range(min(number, 20))]
     named = [named_shape(name) for name in NAMES]
-    cases = [("random", polygons, 3), ("random", polygons, 4), ("non-convex", pocketed, 2)]
-    cases += [] if options.quick else [("named", named, 3), ("named", named, 4)]
-    rows = []
-    for name, shapes, count in cases:
-        rows.append(run(name, shapes, count, options.method, 4.0 if count == 2 else limit))
-        if options.json:
-            options.json.write_text(json.dumps({"method": options.method, "rows": rows}, indent=1))
-    _print(rows, options.method)
-    return 0 if all(meets_bar(row) for row in rows) else 1
+    method, pair_limit = options.method, PAIR_LIMIT / 2 if options.quick else PAIR_LIMIT
+    cases = [("random", polygons, n, method, limit) for n in (3, 4)]
+    cases += [("non-convex", pocketed, 2, method, pair_limit)]
+    if options.quick:
+        return [*cases, ("random", polygons[:4], 3, "thesis", 4.0)]
+    cases += [("named", named, n, method, limit) for n in (3, 4)]
+    return [*cases, ("random", polygons[: options.thesis], 3, "thesis", THESIS_LIMIT)]
 
 
-def _print(rows: list[dict[str, Any]], method: str) -> None:
-    table = Table(title=f"cage synthesis, method {method} (processor seconds)")
-    for heading in ("objects", "N", "verified", "false", "refuted", "median", "max", "bar"):
+def _print(result: dict[str, Any]) -> None:
+    table = Table(title="cage synthesis (processor seconds)")
+    for heading in ("objects", "method", "N", "verified", "false", "refuted", "median", "max", "bar"):
         table.add_column(heading)
-    for row in rows:
+    for row in result["rows"]:
         table.add_row(
             row["case"],
+            row["method"],
             str(row["fingers"]),
             f"{row['verified']}/{row['objects']}",
             str(row["false_cages"]),
@@ -116,7 +141,9 @@ def _print(rows: list[dict[str, Any]], method: str) -> None:
             f"{row['max_seconds']:.1f}",
             "met" if meets_bar(row) else "MISSED",
         )
-    Console().print(table)
+    console = Console()
+    console.print(table)
+    console.print(f"MIP1 took {result['thesis_over_default_time']:.1f} times the default method's time")
 
 
 if __name__ == "__main__":
