@@ -61,6 +61,19 @@ def plan_model(
     settings = settings or SimulatorSettings()
     commands, fingers = planned_commands(scene, positions, forces, settings, contact=contact)
     pose = scene.trajectory.poses[0] if start is None else np.asarray(start, dtype=float)
+    return command_model(scene, commands, fingers, settings, start=pose, timestep=timestep)
+
+
+def command_model(
+    scene: Scene,
+    commands: Array,
+    fingers: Array,
+    settings: SimulatorSettings,
+    *,
+    start: Array,
+    timestep: float = 2.5e-4,
+) -> str:
+    """MJCF text of the scene with commands (S + 1, C, 2) for fingers (C, 2), which begin there, and the first pose (3,)."""
     root = _model(scene, fingers, settings, timestep)
     custom = xml.SubElement(root, "custom")
     interval = scene.trajectory.dt / settings.substeps
@@ -68,7 +81,7 @@ def plan_model(
     _add(custom, "numeric", name="substeps", data=[settings.substeps])
     _add(custom, "numeric", name="commands", data=commands.ravel())
     feet = len(scene.body.vertices) if scene.environment.plane == "transverse" else 0
-    rest = np.concatenate([pose, np.zeros(feet), fingers.ravel()])
+    rest = np.concatenate([start, np.zeros(feet), fingers.ravel()])
     _add(
         xml.SubElement(root, "keyframe"),
         "key",
