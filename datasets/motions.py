@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from datasets.shapes import Shapes, sample_polygon, stable_angles
+from datasets.shapes import ShapeFamily, Shapes, stable_angles
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, rotation, to_world
 from expert.types import (
@@ -256,14 +256,14 @@ class Tasks:
 
 
 def sample_task(
-    rng: np.random.Generator, family: str, shapes: Shapes | None = None, tasks: Tasks | None = None
+    rng: np.random.Generator, family: str, shapes: ShapeFamily | None = None, tasks: Tasks | None = None
 ) -> ContactTask:
     """A random object and a random motion of `family`; the body frame is parallel to the world's at the first pose.
 
     Vertex 0 is the left end of the line on which the object rests.  Raises InvalidProblem as its parts do.
     """
     shapes, tasks = shapes or Shapes(), tasks or Tasks()
-    body, _ = Body.uniform(sample_polygon(rng, shapes), tasks.mass)
+    body, _ = Body.uniform(shapes.sample(rng), tasks.mass)
     motion = sample_motion(rng, body, family, steps=tasks.steps, dt=tasks.dt)
     return tasks.task(*upright(body, motion))
 

@@ -1,6 +1,7 @@
 """Random polygonal objects, as a camera can tell them apart and a floor can bear them."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import shapely
@@ -13,6 +14,26 @@ from expert.types import readonly, require
 ATTEMPTS = 10_000
 STABLE_SHARE = 0.15
 """The weight of an object at rest falls at least this share of the side's length inside it."""
+
+
+class ShapeFamily(Protocol):
+    """What a data set asks of its distribution of shapes: least and greatest number of facets, and range of diameters [m]."""
+
+    @property
+    def facets(self) -> tuple[int, int]: ...
+
+    @property
+    def diameter(self) -> tuple[float, float]: ...
+
+    def sample(self, rng: np.random.Generator) -> Array:
+        """Counter-clockwise vertices (V, 2) [m] about the centroid."""
+
+
+def check_diameter(diameter: object) -> tuple[float, float]:
+    """The range as two numbers.  Raises InvalidProblem (shapes.diameter) for anything else."""
+    small, large = readonly(diameter, (2,), "shapes.diameter").tolist()
+    require(0 < small <= large, "shapes.diameter", "0 < least <= greatest", diameter)
+    return small, large
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,10 +62,9 @@ class Shapes:
             "whole numbers 3 <= least <= greatest <= 64",
             list(self.facets),
         )
-        small, large = readonly(self.diameter, (2,), "shapes.diameter").tolist()
-        require(0 < small <= large, "shapes.diameter", "0 < least <= greatest", list(self.diameter))
         object.__setattr__(self, "facets", (int(few), int(many)))
-        object.__setattr__(self, "diameter", (small, large))
+        object.__setattr__(self, "diameter", check_diameter(self.diameter))
+        small, _ = self.diameter
         require(
             0 <= self.shortest_facet < 1, "shapes.shortest_facet", "a share in [0, 1)", self.shortest_facet
         )
@@ -54,6 +74,10 @@ class Shapes:
         for name in ("sharpest_corner", "deepest_dent", "slightest_turn"):
             angle = getattr(self, name)
             require(0 <= angle < np.pi, f"shapes.{name}", "an angle in [0, pi)", angle)
+
+    def sample(self, rng: np.random.Generator) -> Array:
+        """See sample_polygon."""
+        return sample_polygon(rng, self)
 
 
 def sample_polygon(rng: np.random.Generator, shapes: Shapes) -> Array:

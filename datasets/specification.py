@@ -10,7 +10,7 @@ from datasets.label import Labelling, Refusal, label
 from datasets.motions import FAMILIES, NoRoom, Tasks, sample_task
 from datasets.parameters import MechanicalParameters, parameters_of
 from datasets.render import Camera, Frames, Palette, render
-from datasets.shapes import Shapes
+from datasets.shapes import ShapeFamily, Shapes
 from expert.errors import InvalidProblem, SolverFailed
 from expert.types import ContactTask, Plan, require
 
@@ -28,7 +28,7 @@ class Specification:
     name: str
     count: int
     shard: int = 4
-    shapes: Shapes = field(default_factory=Shapes)
+    shapes: ShapeFamily = field(default_factory=Shapes)
     tasks: Tasks = field(default_factory=Tasks)
     camera: Camera = field(default_factory=Camera)
     palette: Palette = field(default_factory=Palette)
