@@ -161,7 +161,7 @@ class CageProblem:
     fewest: count is then the most fingers there are, and as few of them are used as the search can do with.
     margin: clearance that each condition keeps, relative to the object's diameter.
     rotation: pairs (below, above) of the half-ranges [rad] to try about the pose, in order; empty: the default ladder.
-    parallel: all grippers open along one common direction.
+    parallel: all grippers open along one common direction, in world [rad], or searched where direction is None.
     """
 
     shape: Shape
@@ -172,6 +172,7 @@ class CageProblem:
     walls: Array = field(default_factory=lambda: np.empty((0, 2, 2)))
     grippers: tuple[Gripper, ...] = ()
     parallel: bool = False
+    direction: float | None = None
     cost: CageCost = "none"
     margin: float = 0.002
     rotation: HalfRanges = ()
@@ -201,6 +202,9 @@ class CageProblem:
 
     def _require_ranges(self) -> None:
         require(0 < self.margin < 0.1, "options.margin", "a fraction between 0 and 0.1", self.margin)
+        if self.direction is not None:
+            known = self.parallel and bool(np.isfinite(self.direction))
+            require(known, "fingers.direction", "a finite angle, and parallel: true", self.direction)
         for below, above in self.rotation:
             fits = 0 < below < np.pi and 0 < above < np.pi
             got = f"[{-np.degrees(below):g}, {np.degrees(above):g}] deg"

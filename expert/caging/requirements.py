@@ -9,28 +9,44 @@ from expert.caging.swept import REACH
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, rotation
 from expert.mip.backends import Solver
+from expert.mip.linear import Term
 
 DIRECTIONS = 16
 """Distances are bounded in so many directions."""
+TANGENTS = 24
+"""Of the square of a distance, in a geometric series."""
+GAIN = 0.01
+"""A better cage must have a cost that is smaller by this share."""
 TRIPOD = np.array([[0.0, 1.0], [-np.sqrt(0.5), -np.sqrt(0.5)], [np.sqrt(0.5), -np.sqrt(0.5)]])
 """Directions in which the fingers of a three-finger gripper open (Thesis 5.1.7)."""
 
 
-def require(model: SweptModel, problem: CageProblem, frame: Frame, solver: Solver) -> None:
-    """Add gripper limits and the cost to a model."""
+def require(
+    model: SweptModel,
+    problem: CageProblem,
+    frame: Frame,
+    solver: Solver,
+    direction: float = 0.0,
+    best: float = np.nan,
+) -> None:
+    """Add to a model the gripper limits, with parallel ones opening along a world direction [rad], and the cost.
+
+    Where a cost is known, only answers better than `best` by GAIN are of interest (nan: all).
+    """
     to_relative = rotation(-problem.pose[2])
+    axis = to_relative @ np.array([np.cos(direction), np.sin(direction)])
     for gripper in problem.grippers:
         least, most = (length / frame.radius for length in gripper.opening)
         limit = _parallel_jaws if problem.parallel else _free_jaws
-        limit(model, gripper, least, most, to_relative @ np.array([1.0, 0.0]))
+        limit(model, gripper, least, most, axis)
     if problem.cost == "min_separation":
-        _separation(model, problem.count, solver)
+        _separation(model, problem.count, solver, best / frame.radius**2)
     if problem.cost == "max_opening":
-        _opening(model, problem.count, to_relative)
+        _opening(model, problem.count, to_relative, -best / frame.radius)
 
 
 def _parallel_jaws(model: SweptModel, gripper: Gripper, least: float, most: float, axis: Array) -> None:
-    """Jaws face each other along the world's x axis: fingers[1] - fingers[0] = opening * axis."""
+    """Jaws face each other along the axis: fingers[1] - fingers[0] = opening * axis."""
     a, b = (model.finger(k) for k in gripper.fingers)
     across = np.array([-axis[1], axis[0]])
     model.milp.equal([(across, b), (-across, a)], 0.0)
@@ -41,8 +57,7 @@ def _parallel_jaws(model: SweptModel, gripper: Gripper, least: float, most: floa
 def _free_jaws(model: SweptModel, gripper: Gripper, least: float, most: float, axis: Array) -> None:
     """At most `most` apart in every direction of a polygon inside the circle, at least `least` in one of them."""
     a, b = (model.finger(k) for k in gripper.fingers)
-    angles = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    u = np.column_stack([np.cos(angles), np.sin(angles)])
+    u = _circle(DIRECTIONS)
     apart = [(u, np.broadcast_to(b, u.shape)), (-u, np.broadcast_to(a, u.shape))]
     model.milp.at_most(apart, np.full(DIRECTIONS, most * np.cos(np.pi / DIRECTIONS)))
     if least > 0:
@@ -53,23 +68,38 @@ def _free_jaws(model: SweptModel, gripper: Gripper, least: float, most: float, a
         model.milp.at_most([*negated, (big, chosen[:, None])], np.full(DIRECTIONS, big - least))
 
 
-def _separation(model: SweptModel, count: int, solver: Solver) -> None:
-    """J1: sum of squared distances between all fingers; for a linear solver, of distances in the sum norm."""
-    for i in range(count):
-        for j in range(i):
-            a, b = model.finger(i), model.finger(j)
-            if solver == "highs":
-                d = model.milp.add((2,), 0.0, 2 * REACH)
-                model.milp.at_most([(1.0, a), (-1.0, b), (-1.0, d)], np.zeros(2))
-                model.milp.at_most([(-1.0, a), (1.0, b), (-1.0, d)], np.zeros(2))
-                model.milp.minimise([(1.0, d)])
-            else:
-                model.milp.minimise([], [(1.0, a, b)])
+def _separation(model: SweptModel, count: int, solver: Solver, best: float) -> None:
+    """J1, the sum of squared distances between all fingers; for a linear solver, from below by tangents to a few per cent."""
+    pairs = [(model.finger(i), model.finger(j)) for i in range(count) for j in range(i)]
+    if solver != "highs":
+        model.milp.minimise([], [(1.0, a, b) for a, b in pairs])
+        return
+    squares = model.milp.add((len(pairs),), 0.0, 8 * REACH**2)
+    lengths = model.milp.add((len(pairs),), 0.0, 3 * REACH)
+    u = _circle(DIRECTIONS)
+    at = np.geomspace(0.01, 3 * REACH, TANGENTS)
+    for k, (a, b) in enumerate(pairs):
+        apart: list[Term] = [(u, np.broadcast_to(a, u.shape)), (-u, np.broadcast_to(b, u.shape))]
+        model.milp.at_most([*apart, (-1.0, np.repeat(lengths[k], DIRECTIONS))], np.zeros(DIRECTIONS))
+        tangents: list[Term] = [
+            (2 * at, np.repeat(lengths[k], TANGENTS)),
+            (-1.0, np.repeat(squares[k], TANGENTS)),
+        ]
+        model.milp.at_most(tangents, at**2)
+    model.milp.minimise([(1.0, squares)])
+    if np.isfinite(best):
+        model.milp.at_most([(1.0, squares)], (1 - GAIN) * best)
 
 
-def _opening(model: SweptModel, count: int, to_relative: Array) -> None:
+def _circle(count: int) -> Array:
+    angles = 2 * np.pi * np.arange(count) / count
+    return np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def _opening(model: SweptModel, count: int, to_relative: Array, best: float) -> None:
     """J2 = -alpha: two fingers open along x, three along the tripod's directions."""
-    alpha = model.milp.add((1,), 0.0, 2 * REACH)
+    least = (1 + GAIN) * best if np.isfinite(best) else 0.0
+    alpha = model.milp.add((1,), min(least, 2 * REACH), 2 * REACH)
     if count == 2:
         axis = to_relative @ np.array([1.0, 0.0])
         ends = [(axis, model.finger(1)), (-axis, model.finger(0))]

@@ -1,17 +1,18 @@
 """Find fingers that cage an object: solve the model over a ladder of rotation ranges, verify, cut off what is refuted.
 
-No answer leaves unverified.  Where no cost or gripper restricts the fingers, cages around immobilising grasps are tried
-between the quick and the thorough part of the ladder.
+No answer leaves unverified.  Cages around immobilising grasps are tried between the quick and the thorough part of the
+ladder, or first of all where walls, fixed fingers, grippers or a cost take part.
 """
 
 import itertools
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
+from expert.caging.closures import Closures, directions
 from expert.caging.frame import Frame
 from expert.caging.immobilise import candidates
 from expert.caging.model import SweptModel
@@ -25,6 +26,7 @@ from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, to_world
 from expert.mip.backends import Solver
 from expert.verify.cage import CageReport, verify_cage
+from expert.verify.cage_claims import unmet_claim
 
 Method = Literal["swept", "model", "thesis"]
 """swept: the model, and immobilising grasps where it is slow; model: the model alone; thesis: MIP1."""
@@ -34,6 +36,8 @@ LADDER = tuple((np.radians(a), np.radians(b)) for a, b in (
 ))  # fmt: skip
 TIGHT = np.radians(20)
 """Restricted fingers leave less room: the ladder begins with ranges of about this width."""
+WIDE = np.radians(75)
+"""Far apart or close together, free fingers hold an object loosely: with a cost the ladder begins with such ranges."""
 THESIS_LADDER = ((np.radians(40), np.radians(40)), (np.radians(90), np.radians(90)))
 THESIS_SLICES = 9
 """Slices of MIP1, as many as in Thesis 5.1.7."""
@@ -70,6 +74,8 @@ class Tally:
     refuted: int = 0
     unconfirmed: int = 0
     undecided: bool = False
+    fruitless: set[tuple[object, ...]] = field(default_factory=set)
+    """Models proved infeasible.  A better answer to beat does not make them feasible."""
     best: CageSolution = field(default_factory=lambda: CageSolution(status="none_found"))
 
     @property
@@ -94,16 +100,18 @@ class Tally:
         return report
 
     def keep(self, fingers: Array, report: CageReport, topology: tuple[Meeting, ...] = ()) -> None:
-        """Remember a verified cage if it is the best so far."""
-        value = objective(self.problem, fingers)
-        if not self.best.found or value < self.best.objective:
-            self.best = CageSolution(
-                status="caged",
-                fingers=fingers,
-                rotation_range=report.rotation_range,
-                topology=topology,
-                objective=value,
-            )
+        """Remember a verified cage if it is the best so far and keeps what else was asked for."""
+        found = CageSolution(
+            status="caged",
+            fingers=fingers,
+            rotation_range=report.rotation_range,
+            topology=topology,
+            objective=objective(self.problem, fingers),
+        )
+        if unmet_claim(self.problem, found):
+            self.refuted += 1
+        elif not self.best.found or found.objective < self.best.objective:
+            self.best = found
 
 
 def solve(
@@ -211,8 +219,11 @@ def _answer(tally: Tally, seconds: float) -> CageSolution:
 
 def _attempts(problem: CageProblem, method: Method) -> Iterator[Attempt | None]:
     """Quick models, grasps (None), then models of growing size and time."""
-    plain = problem.cost == "none" and not problem.grippers and not len(problem.walls)
-    ranges = problem.rotation or (LADDER if plain else sorted(LADDER, key=lambda r: abs(sum(r) - TIGHT)))
+    plain = problem.cost == "none" and not _restricted(problem)
+    if not plain and method != "model":
+        yield None
+    middle = TIGHT if _restricted(problem) else WIDE
+    ranges = problem.rotation or (LADDER if plain else sorted(LADDER, key=lambda r: abs(sum(r) - middle)))
     few = problem.count + len(problem.fixed) == 2 and not len(problem.walls)
     if plain and not few:
         yield from (Attempt(below, above, 3, True, 0.4) for below, above in ranges[:QUICK])
@@ -227,11 +238,9 @@ def _attempts(problem: CageProblem, method: Method) -> Iterator[Attempt | None]:
 def _try_grasps(tally: Tally) -> None:
     """Cages around immobilising grasps that hold even where each finger is off by half the margin."""
     problem = tally.problem
-    if problem.count < 2:
-        return
     slack = 0.5 * problem.margin * problem.shape.size
     rng = np.random.default_rng(0)
-    for fingers in candidates(problem.shape.vertices, problem.count, problem.shape.size, rng):
+    for fingers in _grasps(problem, rng):
         if tally.left <= 0:
             return
         tally.attempts += 1
@@ -242,40 +251,64 @@ def _try_grasps(tally: Tally) -> None:
             return
 
 
+def _restricted(problem: CageProblem) -> bool:
+    return bool(problem.grippers) or bool(len(problem.walls)) or bool(len(problem.fixed))
+
+
+def _grasps(problem: CageProblem, rng: np.random.Generator) -> Iterator[Array]:
+    """Fingers (count, 2) in the body frame, close to where they hold the object."""
+    if problem.cost == "max_opening" and problem.count == 3:
+        return  # a tripod is no free choice of three points
+    if _restricted(problem):
+        yield from Closures(problem).candidates(rng)
+    else:
+        for fingers in candidates(problem.shape.vertices, problem.count, problem.shape.size, rng):
+            across = to_world(problem.pose, fingers)[:, 0]
+            yield (
+                fingers[np.argsort(across)] if problem.cost == "max_opening" else fingers
+            )  # they open along x
+
+
 def _try_models(tally: Tally, attempt: Attempt, solver: Solver) -> None:
     """Solve one model for each order of the loop; verify, and cut off what is refuted."""
     problem = tally.problem
     frame = Frame.of(problem.shape, problem.pose)
     clearance = problem.margin * problem.shape.size / frame.radius
     geometry = SweptGeometry(frame.body(problem.shape.vertices), clearance, attempt.most_pieces)
-    for ring in rings(problem, frame):
+    orders = enumerate(rings(problem, frame))
+    for opening, (k, ring) in itertools.product(directions(problem), orders):
         alike = len(ring) == problem.count and not labelled(problem)
         for filling in hubs(len(ring), alike):
             if tally.left <= 0 or tally.done:
                 return
+            key = (*astuple(attempt)[:-1], opening, k, filling)
+            if key in tally.fruitless:
+                continue
             model = SweptModel(
                 geometry, ring, (-attempt.below, attempt.above), hubs=filling, one_piece=attempt.one_piece
             )
             if not model.feasible:
                 continue
             break_symmetry(model, problem)
-            require(model, problem, frame, solver)
-            _search(tally, model, frame, attempt.seconds, solver)
+            require(model, problem, frame, solver, opening, tally.best.objective)
+            if _search(tally, model, frame, attempt.seconds, solver):
+                tally.fruitless.add(key)
 
 
 def _search(
     tally: Tally, model: SweptModel | ThesisModel, frame: Frame, seconds: float, solver: Solver
-) -> None:
-    """Verify what the model proposes, and cut off what is refuted."""
+) -> bool:
+    """Verify what the model proposes, and cut off what is refuted.  Whether it was proved to have no more to propose."""
     for _ in range(MOST_CUTS):
         tally.attempts += 1
         proposal = model.propose(solver, max(min(seconds, tally.left), 0.01))
         if proposal.fingers is None:
             tally.undecided |= proposal.status != "infeasible"
-            return
+            return proposal.status == "infeasible"
         fingers = frame.world(proposal.fingers)
         report = tally.judge(fingers)
         if report is not None and report.verdict == "caged":
             tally.keep(fingers, report, proposal.meetings)
-            return
+            return False
         model.cut_off()
+    return False

@@ -31,7 +31,9 @@ def read(data: dict[str, Any]) -> tuple[CageProblem | Arrangement, dict[str, Any
         np.stack([wall.array("from", (2,)), wall.array("to", (2,))])
         for wall in file.sections("walls", ("from", "to"))
     ]
-    fingers = file.section("fingers", ("count", "fewest", "positions", "fixed", "grippers", "parallel"))
+    fingers = file.section(
+        "fingers", ("count", "fewest", "positions", "fixed", "grippers", "parallel", "direction")
+    )
     fixed = fingers.array("fixed", (None, 2)) if "fixed" in fingers else np.empty((0, 2))
     options = file.section("options", ("margin", "rotation", "time_limit", "method", "solver"), optional=True)
     common: dict[str, Any] = {"shape": shape, "pose": pose, "walls": np.reshape(walls, (-1, 2, 2))}
@@ -44,6 +46,7 @@ def read(data: dict[str, Any]) -> tuple[CageProblem | Arrangement, dict[str, Any
         fixed=fixed,
         grippers=read_grippers(fingers),
         parallel=_flag(fingers, "parallel"),
+        direction=float(np.radians(fingers.number("direction"))) if "direction" in fingers else None,
         cost=file.choice("cost", COSTS, "none"),  # type: ignore[arg-type]
         margin=options.number("margin", 0.002),
         rotation=_read_rotation(options),
@@ -82,7 +85,7 @@ def require_size(field: str, points: Array) -> None:
 
 
 def _read_arrangement(file: Section, fingers: Section, fixed: Array, common: dict[str, Any]) -> Arrangement:
-    for key in ("count", "fewest", "grippers", "parallel"):
+    for key in ("count", "fewest", "grippers", "parallel", "direction"):
         if key in fingers:
             raise InvalidProblem(
                 fingers.path(key), expected="nothing beside positions", got="both", remedy="remove one"

@@ -18,6 +18,7 @@ from expert.caging.problem import Arrangement, CageProblem
 from expert.caging.solution import CageSolution
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
+from expert.verify.cage_claims import unmet_claim
 from expert.verify.cage_search import UNIT, CageSearch, Verdict
 
 
@@ -28,7 +29,7 @@ class CageReport:
     rotation_range: orientations [rad] that the object can reach at most (caged); (-inf, inf) where it may turn for good.
     path: body poses (K, 3) of an escape; neighbours differ by a translation or by a rotation about a fixed point.
     resolution: half-width [rad] of the smallest cell.  cells: how many were computed.
-    reason: why an answer was refuted before its cage was looked at: its grippers cannot do it.
+    reason: why an answer was refuted before its cage was looked at: its grippers cannot do it, or its cost is another.
     """
 
     verdict: Verdict | Literal["refuted"]
@@ -112,20 +113,6 @@ def verify(task: Arrangement | CageProblem, answer: CageSolution | None = None) 
         raise InvalidProblem(
             "status", expected="caged", got=answer.status, remedy="there is no claim to check"
         )
-    if fault := gripper_fault(task, answer.fingers):
-        return CageReport(verdict="refuted", cells=0, resolution=np.pi, seconds=0.0, reason=fault)
+    if claim := unmet_claim(task, answer):
+        return CageReport(verdict="refuted", cells=0, resolution=np.pi, seconds=0.0, reason=claim)
     return verify_cage(task.arrangement(answer.fingers))
-
-
-def gripper_fault(task: CageProblem, fingers: Array) -> str:
-    """Which gripper cannot hold its fingers (count, 2) there; empty if all can."""
-    tolerance = 1e-6 * task.shape.size
-    for k, gripper in enumerate(task.grippers):
-        i, j = gripper.fingers
-        step = fingers[j] - fingers[i]
-        if task.parallel and (abs(step[1]) > tolerance or step[0] < -tolerance):
-            return f"gripper {k} is not parallel to the x axis"
-        least, most = gripper.opening
-        if not least - tolerance <= np.linalg.norm(step) <= most + tolerance:
-            return f"gripper {k} opens by {np.linalg.norm(step):.4g} m, outside [{least:g}, {most:g}]"
-    return ""
