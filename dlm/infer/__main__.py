@@ -18,11 +18,17 @@ from expert.files.document import save
 from expert.types import require
 
 NO_PLAN = 4
+NUMBERS = (
+    *("scale", "object_size", "floor", "mass", "friction", "duration"),
+    *("start", "end", "rate", "tolerance"),
+)
 
 
 @entry_point("infer")
 def main(cfg: DictConfig) -> None:
     """Perceive, plan, simulate; write actions and animation."""
+    for name in NUMBERS:
+        require(cfg[name] is None or isinstance(cfg[name], int | float), name, "a number", cfg[name])
     folder = Path(cfg.out or Path("outputs") / "infer" / Path(cfg.video).stem)
     require(not folder.exists() or folder.is_dir(), "out", "a folder", f"{folder}, a file")
     with Console(stderr=True).status("perceiving and planning") as status:

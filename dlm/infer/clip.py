@@ -4,6 +4,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from datasets.render import Frames
@@ -11,10 +12,9 @@ from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
 from expert.types import require
 
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # what they would say of a bad file we say in one line
-os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
-
-import cv2
+os.environ.setdefault(
+    "OPENCV_FFMPEG_LOGLEVEL", "-8"
+)  # what FFmpeg would say of a bad file we say in one line
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +53,7 @@ def read_clip(
 
 def _measure(path: str | Path) -> tuple[int, float]:
     """Frames that can be decoded, and the stated rate.  The stated count is not to be trusted."""
-    video = cv2.VideoCapture(str(path))
+    video = _open(path)
     if not video.isOpened():
         raise InvalidProblem(
             "video",
@@ -78,9 +78,19 @@ def _measure(path: str | Path) -> tuple[int, float]:
     return count, rate
 
 
+def _open(path: str | Path) -> cv2.VideoCapture:
+    """Without OpenCV's own words on standard error."""
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        return cv2.VideoCapture(str(path))
+    finally:
+        cv2.utils.logging.setLogLevel(level)
+
+
 def _read(path: str | Path, chosen: np.ndarray) -> Frames:
     """Decoded frames of the given numbers, in order; the others pass by without filling the memory."""
-    video, frames, wanted = cv2.VideoCapture(str(path)), [], set(chosen.tolist())
+    video, frames, wanted = _open(path), [], set(chosen.tolist())
     try:
         for k in range(int(chosen[-1]) + 1):
             video.grab()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from PIL import Image
 
 from datasets.render import Frames, Palette
 from expert.errors import InvalidProblem
@@ -60,18 +61,20 @@ class Segmentation:
         return np.stack([self._clean(mask) for mask in raw])
 
     def _empty(self, frames: Frames) -> np.ndarray:
-        image = cv2.imread(str(self.background))
-        if image is None:
+        try:
+            with Image.open(str(self.background)) as picture:
+                image = np.array(picture.convert("RGB"), dtype=float)
+        except (OSError, SyntaxError) as error:
             raise InvalidProblem(
                 "segmentation.background", expected="a picture", got=f"{self.background}, which is none"
-            )
+            ) from error
         require(
             image.shape == frames.shape[1:],
             "segmentation.background",
             f"a picture of {frames.shape[2]} x {frames.shape[1]} pixels, as the video's",
             f"{image.shape[1]} x {image.shape[0]}",
         )
-        return cv2.cvtColor(image, cv2.COLOR_BGR2RGB).astype(float)
+        return image
 
     def _clean(self, mask: Mask) -> Mask:
         """Pieces that are large enough, with their holes filled."""
