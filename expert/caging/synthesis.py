@@ -73,9 +73,8 @@ class Tally:
     attempts: int = 0
     refuted: int = 0
     unconfirmed: int = 0
-    undecided: bool = False
-    fruitless: set[tuple[object, ...]] = field(default_factory=set)
-    """Models proved infeasible.  A better answer to beat does not make them feasible."""
+    exhausted: dict[tuple[object, ...], bool] = field(default_factory=dict)
+    """Whether each model tried is proved to have no (more) solutions.  A better answer to beat does not give it any."""
     best: CageSolution = field(default_factory=lambda: CageSolution(status="none_found"))
 
     @property
@@ -184,11 +183,14 @@ def _search_slices(tally: Tally, solver: Solver) -> None:
             angles,
             problem.count,
         )
-        _search(tally, model, frame, tally.left, solver)
+        tally.exhausted[below, above] = _search(tally, model, frame, tally.left, solver)
 
 
 def _search_ranges(tally: Tally, method: Method, solver: Solver) -> None:
     """Swept models, and grasps, for one range of rotation after the other."""
+    if tally.problem.count == 0:
+        _judge_fixed(tally)
+        return
     for attempt in _attempts(tally.problem, method):
         if tally.left <= 0 or tally.done:
             return
@@ -198,10 +200,17 @@ def _search_ranges(tally: Tally, method: Method, solver: Solver) -> None:
             _try_models(tally, attempt, solver)
 
 
+def _judge_fixed(tally: Tally) -> None:
+    """Nothing is to be placed: do the fixed fingers cage the object by themselves?"""
+    report = tally.judge(np.empty((0, 2)))
+    if report is not None and report.verdict == "caged":
+        tally.keep(np.empty((0, 2)), report)
+
+
 def _answer(tally: Tally, seconds: float) -> CageSolution:
     best = tally.best
     if not best.found:
-        stopped = tally.left <= 0 or tally.undecided
+        stopped = tally.left <= 0 or not all(tally.exhausted.values())
         reason = (
             "the time limit was reached before any cage was verified"
             if stopped
@@ -282,7 +291,7 @@ def _try_models(tally: Tally, attempt: Attempt, solver: Solver) -> None:
             if tally.left <= 0 or tally.done:
                 return
             key = (*astuple(attempt)[:-1], opening, k, filling)
-            if key in tally.fruitless:
+            if tally.exhausted.get(key):
                 continue
             model = SweptModel(
                 geometry, ring, (-attempt.below, attempt.above), hubs=filling, one_piece=attempt.one_piece
@@ -291,8 +300,7 @@ def _try_models(tally: Tally, attempt: Attempt, solver: Solver) -> None:
                 continue
             break_symmetry(model, problem)
             require(model, problem, frame, solver, opening, tally.best.objective)
-            if _search(tally, model, frame, attempt.seconds, solver):
-                tally.fruitless.add(key)
+            tally.exhausted[key] = _search(tally, model, frame, attempt.seconds, solver)
 
 
 def _search(
@@ -303,7 +311,6 @@ def _search(
         tally.attempts += 1
         proposal = model.propose(solver, max(min(seconds, tally.left), 0.01))
         if proposal.fingers is None:
-            tally.undecided |= proposal.status != "infeasible"
             return proposal.status == "infeasible"
         fingers = frame.world(proposal.fingers)
         report = tally.judge(fingers)

@@ -171,3 +171,46 @@ def test_an_answer_that_its_grippers_cannot_hold_is_refuted() -> None:
     report = verify(task, answer)
     assert report.verdict == "refuted"
     assert "gripper 0 opens by 0.04 m" in str(report)
+
+
+@pytest.mark.parametrize(("name", "count"), [("hourglass", 3), ("T", 3)])
+def test_scip_finds_cages_too(name: str, count: int) -> None:
+    task = problem(named_shape(name), count, rotation=(tuple(np.radians([20, 20])),))
+    answer = solve(task, time_limit=120, method="model", solver="scip")
+    assert answer.found
+    assert answer.refuted == 0
+    assert verify(task, answer).verdict == "caged"
+
+
+def test_the_fewest_fingers_are_used_and_what_fewer_gave_is_said() -> None:
+    waist = problem(named_shape("hourglass"), 4, fewest=True)
+    answer = solve(waist, time_limit=60)
+    assert answer.fingers.shape == (2, 2)
+    assert answer.reason == "2 fingers: caged"
+    triangle = np.array([[0, 0], [0.1, 0], [0.03, 0.08]])
+    answer = solve(problem(triangle, 4, fewest=True), time_limit=60)
+    assert answer.fingers.shape == (3, 2)
+    assert answer.reason in (
+        "2 fingers: no cage of the kind searched for; 3 fingers: caged",
+        "2 fingers: undecided in their share of the time; 3 fingers: caged",
+    )
+    assert verify(problem(triangle, 4, fewest=True), answer).verdict == "caged"
+
+
+def test_fewest_adds_up_what_happened_and_ends_in_time() -> None:
+    triangle = np.array([[0, 0], [0.1, 0], [0.03, 0.08]])
+    answer = solve(problem(triangle, 3, fewest=True), time_limit=1e-9)
+    assert answer.status == "time_limit"
+    assert answer.reason.count("undecided") == 2
+    answer = solve(problem(triangle, 2, fewest=True), time_limit=30)
+    assert answer.status == "none_found"
+    assert answer.attempts > 0
+
+
+def test_fixed_fingers_count_towards_the_fewest() -> None:
+    """Two fixed fingers hold the waist of the hourglass: no searched finger is needed."""
+    vertices = named_shape("hourglass")
+    held = solve(problem(vertices, 2), time_limit=60).fingers
+    answer = solve(problem(vertices, 2, fewest=True, fixed=held), time_limit=60)
+    assert answer.found
+    assert answer.fingers.shape == (0, 2)
