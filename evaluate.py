@@ -16,6 +16,7 @@ from rich.console import Console
 from datasets.entry import entry_point
 from datasets.store import write_whole
 from dlm.checkpoint import About, load, restore_weights
+from dlm.evaluation.baselines import unlearned
 from dlm.evaluation.extras import read_extras
 from dlm.evaluation.report import png
 from dlm.evaluation.study import Study, Trained
@@ -37,6 +38,7 @@ def main(cfg: DictConfig) -> None:
         trained=[trained(cfg, name) for name in STAGES],
         tasks=tasks,
         simulator=instantiate(cfg.simulator, _convert_="object"),
+        baselines=unlearned() if cfg.perceived else {},
     )
     with Console(stderr=True).status("simulating") as status:
         outcomes = study.outcomes()

@@ -14,6 +14,7 @@ from datasets.entry import entry_point
 from dlm.infer.drawing import draw_inference
 from dlm.infer.inference import Inference, Scene, infer
 from dlm.infer.segmentation import Segmentation
+from dlm.structured.weights import trained_model
 from expert.files.document import save
 from expert.types import require
 
@@ -40,6 +41,7 @@ def main(cfg: DictConfig) -> None:
                 background=cfg.background,
                 tolerance=cfg.tolerance,
             ),
+            model=None if cfg.checkpoint is None else trained_model(Path(cfg.checkpoint)),
             refine=cfg.refine,
             start=cfg.start,
             end=cfg.end,

@@ -105,7 +105,8 @@ def _find_object(frames: Frames, floor: float) -> tuple[float, float, float, flo
     small = np.stack([_resized(_cut(frame, x, y, side), size) for frame in frames])
     below = (height - floor) / side
     camera = Camera(size=size, scale=1.0, below=size * below)
-    masks = segment(separate(small, camera, floor=True)).masks[:, ::-1]
+    look = separate(small, camera, floor=True, blur=0.0)
+    masks = segment(look, margin=0).masks[:, ::-1]
     places = [np.argwhere(mask) for mask in masks]
     low = np.min([p.min(axis=0) for p in places], axis=0)
     high = np.max([p.max(axis=0) for p in places], axis=0) + 1

@@ -9,9 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dlm.derender import NetworkSizes
 from dlm.infer.__main__ import main
+from dlm.inverse_dynamics import InverseDynamics
+from dlm.losses import ParameterLoss
+from dlm.models import ThesisModel
+from dlm.parameters import Layout
 from dlm.simulator.__main__ import main as simulate
 from dlm.tasks import TaskBatch
+from dlm.training import Schedule, Stage, Training
 from expert.__main__ import main as expert
 from tests.dlm.infer.clips import drawn, write_clip
 
@@ -35,6 +41,11 @@ def folder(tasks: TaskBatch, tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_clip(folder / "two.mp4", two)
     (folder / "text.mp4").write_text("not a video\n" * 100)
     (folder / "empty.mp4").write_bytes(b"")
+    small = NetworkSizes(channels=(2, 3, 4), latent=8, recurrent_layers=1, hidden_layers=1)
+    policy = ThesisModel(sizes=small, layout=Layout()).build("perceptron", InverseDynamics(), seed=0)
+    stage = Stage(name="nn", policy="perceptron", loss=ParameterLoss(), dataset="train")
+    training = Training(policy, stage.loss, tasks, Schedule())
+    training.checkpoint(stage, "thesis", {}).save(folder / "thesis.safetensors")
     whole = (folder / "good.mp4").read_bytes()
     (folder / "cut.mp4").write_bytes(whole[: len(whole) // 2])
     return folder
@@ -74,6 +85,8 @@ def test_a_video_becomes_actions_that_others_can_read(
     assert (out / "motion.gif").stat().st_size > 10_000
 
 
+GOOD = ["video=good.mp4", "scale=0.001"]
+
 WRONG = {
     "no video": ([], "video"),
     "no such file": (["video=none.mp4", "scale=0.001"], "video: expected a file, got none.mp4"),
@@ -94,6 +107,9 @@ WRONG = {
     "refine": (["video=good.mp4", "scale=0.001", "refine=magic"], "refine: expected expert"),
     "unknown option": (["video=good.mp4", "metres=1"], "metres"),
     "out is a file": (["video=good.mp4", "scale=0.001", "out=text.mp4"], "out: expected a folder"),
+    "no weights": ([*GOOD, "checkpoint=none.safetensors"], "checkpoint: expected the file none.safetensors"),
+    "no safetensors": ([*GOOD, "checkpoint=text.mp4"], "text.mp4: expected a whole checkpoint"),
+    "another model": ([*GOOD, "checkpoint=thesis.safetensors"], "expected weights of model structured, got .* thesis"),
     "no background": (["video=good.mp4", "scale=0.001", "background=none.png"], "background: expected a picture"),
 }  # fmt: skip
 
