@@ -13,12 +13,14 @@ from functools import cached_property
 
 import numpy as np
 
-from expert.geometry.pose import Array
+from expert.geometry.pose import Array, cross
 from expert.grasping.facets import Facets, rays
 from expert.grasping.rows import Rows
 
-LEAST_MOMENT = 0.02
+LEAST_MOMENT = 0.05
 """Moment (relative length) that each of the two rays must have at the end, in opposite senses."""
+OVERLAP = 2.0
+LEAST_SINE = 0.1
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,9 @@ class GoalCell:
         corners = [self._corner(i, j) for i, j in pairs]
         rows = []
         for (i, j), (V, c) in zip(pairs, corners, strict=True):
-            rows += [self._on_facet(i, V, c), self._on_facet(j, *self._seen_from(j, i, V, c))]
+            inset = self._inset(i, j)
+            rows.append(self._on_facet(i, V, c, inset))
+            rows.append(self._on_facet(j, *self._seen_from(j, i, V, c), inset))
             rows += [self._in_wedge(n, *self._seen_from(n, i, V, c)) for n in range(self.count)]
         return Rows.join(rows)
 
@@ -92,12 +96,16 @@ class GoalCell:
         moved[:, i] -= np.eye(2)
         return moved, constant
 
-    def _on_facet(self, n: int, A: Array, constant: Array) -> Rows:
+    def _inset(self, i: int, j: int) -> float:
+        """Distance from the facets' ends at which obstacles that cross at the angle of these facets overlap by the margin."""
+        return OVERLAP * self.margin / max(abs(float(cross(self.normals[i], self.normals[j]))), LEAST_SINE)
+
+    def _on_facet(self, n: int, A: Array, constant: Array, inset: float) -> Rows:
         facet = self.chosen[n]
         along = self.table.tangents[facet]
         V = np.einsum("d,dnx->nx", along, A)[None]
         shift = along @ constant
-        low, high = self.table.low[facet] + self.margin, self.table.high[facet] - self.margin
+        low, high = self.table.low[facet] + inset, self.table.high[facet] - inset
         return Rows(V, np.array([low - shift]), np.array([high - shift]))
 
     def _in_wedge(self, n: int, A: Array, constant: Array) -> Rows:
@@ -118,16 +126,21 @@ class GoalCell:
             parts += [below.at(side * limit), below.at(side * reach), falling.slope(side * limit)]
         return Rows.join(parts)
 
-    def end(self, reach: float) -> Rows:
+    def end(self, reach: float, moment: float = LEAST_MOMENT) -> Rows:
         """Conditions at the last knot: all fingers touch at the goal, and the rays' moments hold it (form closure)."""
         eps = self.margin * min(1.0, np.sin(reach) / np.sin(np.radians(3)))
         touch = self.clearance().at(0.0)
         parts = [self.contacts.over(-reach, reach), Rows(touch.V, touch.low, touch.low)]
         for k, side in ((self.up, 1.0), (self.down, -1.0)):
             below = self.ray_rows(k, -np.inf, -eps)
-            falling = Rows(side * below.V, np.array([-np.inf]), np.array([-LEAST_MOMENT]))
+            falling = Rows(side * below.V, np.array([-np.inf]), np.array([-moment]))
             parts += [below.at(side * reach), falling.slope(0.0)]
         return Rows.join(parts)
+
+    def moments(self) -> Rows:
+        """f'(0) >= 0 of the ray that shuts the cell below, -f'(0) >= 0 of the one above."""
+        V = np.stack([-self.ray_rows(self.up, 0, 0).V[0], self.ray_rows(self.down, 0, 0).V[0]])
+        return Rows(V, np.zeros(2), np.full(2, np.inf)).slope(0.0)
 
     def slice(self, p: Array, angle: float = 0.0) -> tuple[Array, Array]:
         """The cell at an orientation, {x : A x <= b}, for fingers p (N, 2)."""

@@ -49,6 +49,14 @@ class Facets:
         """Convex free region over each facet; None where all beyond its line is free."""
         return tuple(_wedge(self, k) for k in range(len(self)))
 
+    def beyond(self, k: int) -> Region:
+        """The half-plane beyond facet k's line, less what its wedge excludes."""
+        wedge = self.wedges[k]
+        normals, offsets = -self.normals[[k]], -self.offsets[[k]]
+        if wedge is None:
+            return Region(normals, offsets)
+        return Region(np.concatenate([normals, wedge.A]), np.concatenate([offsets, wedge.b]))
+
     def by_angle(self, chosen: tuple[int, ...]) -> tuple[int, ...]:
         """The same facets in the order of their normals' angles."""
         angle = np.arctan2(self.normals[:, 1], self.normals[:, 0])

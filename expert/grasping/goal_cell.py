@@ -7,7 +7,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from expert.geometry.cover import clip
-from expert.geometry.pose import Array, cross
+from expert.geometry.polygon import signed_area
+from expert.geometry.pose import Array
 from expert.grasping.cell import LEAST_MOMENT, GoalCell
 from expert.grasping.facets import Facets, rays, tuples
 from expert.grasping.rows import Rows
@@ -21,14 +22,21 @@ MIN_WEIGHT, SUM_WEIGHT = 0.5, 0.125
 """The region of attraction counts min_h alpha_h and sum_h alpha_h with these weights."""
 
 
+MOST_CUTS = 15
+"""Linear programs for one largest start."""
+
+
 @dataclass(frozen=True)
 class Candidate:
-    """A goal cell whose end and start knots exist; attraction: objective at the start; start, end (N, 2)."""
+    """A goal cell whose every knot exists, with its largest start.
+
+    attraction: objective there; start (N, 2): fingers there; firmest: largest moment that can hold the object in the end.
+    """
 
     cell: GoalCell
     attraction: float
     start: Array
-    end: Array
+    firmest: float
 
 
 def cells(table: Facets, count: int, margin: float) -> list[GoalCell]:
@@ -43,13 +51,17 @@ def cells(table: Facets, count: int, margin: float) -> list[GoalCell]:
 
 
 def _moments(table: Facets, chosen: tuple[int, ...], margin: float) -> Array:
-    """Least and largest f'(0) (k, 2) of each ray with contacts anywhere on the facets."""
+    """Least and largest f'(0) = sum lambda tangent . p (k, 2) of each ray with contacts anywhere on the facets."""
     index = list(chosen)
     weights = rays(table.normals[index])
-    # f'(0) = sum lambda (perp n) . p, and perp n = tangent for an outward normal of a counter-clockwise polygon ...
-    turning = cross(table.normals[index], table.tangents[index])
-    ends = turning[:, None] * np.column_stack([table.low[index] + margin, table.high[index] - margin])
+    ends = np.column_stack([table.low[index] + margin, table.high[index] - margin])
     return np.column_stack([weights @ ends.min(axis=1), weights @ ends.max(axis=1)])
+
+
+def hold(cell: GoalCell) -> float:
+    """The smaller of the two moments with which contacts anywhere on the facets can hold the object at the goal."""
+    reachable = _moments(cell.table, cell.chosen, cell.margin)
+    return float(min(-reachable[cell.up, 0], reachable[cell.down, 1]))
 
 
 def solve_rows(rows: Rows, extra: int, cost: Array, more: Array, more_low: Array) -> Answer:
@@ -92,6 +104,49 @@ def start_knot(cell: GoalCell, rows: Rows) -> tuple[float, Array] | None:
     return float(-cost @ answer.x), answer.x[: 2 * count].reshape(count, 2)
 
 
+def largest_start(cell: GoalCell, rows: Rows, p: Array) -> tuple[float, Array]:
+    """Largest area of the cell at the goal's angle, to 1 %, from fingers p (N, 2): area and fingers.
+
+    The root of the area of {x : A x <= b} is concave in b (Brunn, Minkowski) and b is affine in p.  Its derivative by b
+    is edge lengths over twice the root: Kelley's cutting planes.
+    """
+    best, best_p = 0.0, p
+    more, low = np.empty((0, p.size + 1)), np.empty(0)
+    for _ in range(MOST_CUTS):
+        area, lengths = _area_and_edges(cell, p)
+        if area > best:
+            best, best_p = area, p
+        root = np.sqrt(max(area, 1e-12))
+        slope = (lengths[:, None] * cell.normals / (2 * root)).ravel()
+        more, low = np.vstack([more, np.append(slope, -1.0)]), np.append(low, slope @ p.ravel() - root)
+        answer = solve_rows(rows, 1, np.append(np.zeros(p.size), -1.0), more, low)
+        if answer.x is None or answer.x[-1] <= 1.005 * np.sqrt(best):
+            break
+        p = answer.x[:-1].reshape(-1, 2)
+    return best, best_p
+
+
+def _area_and_edges(cell: GoalCell, p: Array) -> tuple[float, Array]:
+    """Area of the cell at the goal's angle, and the length of its edge on each finger's line (N,)."""
+    polygon = region(cell, p)
+    if len(polygon) < 3:
+        return 0.0, np.ones(cell.count)
+    A, b = cell.slice(p)
+    following = np.roll(polygon, -1, axis=0)
+    middles = (polygon + following) / 2
+    on = np.abs(middles @ A.T - b).argmin(axis=1)
+    lengths = np.bincount(on, np.linalg.norm(following - polygon, axis=1), cell.count)
+    return abs(signed_area(polygon)), lengths
+
+
+def firmest_end(cell: GoalCell, reach: float) -> float | None:
+    """Largest moment that both rays can have at the last knot; None where it does not exist."""
+    count, moments = 2 * cell.count, cell.moments().V.reshape(2, -1)
+    more = np.column_stack([moments, -np.ones(2)])
+    answer = solve_rows(cell.end(reach), 1, np.append(np.zeros(count), -1.0), more, np.zeros(2))
+    return None if answer.x is None else float(answer.x[-1])
+
+
 def some_knot(cell: GoalCell, rows: Rows) -> Array | None:
     """Fingers (N, 2) that meet all rows."""
     size = 2 * cell.count
@@ -101,8 +156,8 @@ def some_knot(cell: GoalCell, rows: Rows) -> Array | None:
 
 def candidate(cell: GoalCell, half_ranges: Array) -> Candidate | None:
     """The best start and some end of a goal cell whose every knot exists."""
-    end = some_knot(cell, cell.end(half_ranges[-2]))
-    if end is None:
+    firmest = firmest_end(cell, half_ranges[-2])
+    if firmest is None:
         return None
     best = start_knot(cell, cell.knot(half_ranges[0], half_ranges[0]))
     if best is None:
@@ -110,7 +165,7 @@ def candidate(cell: GoalCell, half_ranges: Array) -> Candidate | None:
     for reach, limit in itertools.pairwise(half_ranges[:-1]):
         if some_knot(cell, cell.knot(reach, limit)) is None:
             return None
-    return Candidate(cell, best[0], best[1], end)
+    return Candidate(cell, best[0], best[1], firmest)
 
 
 def region(cell: GoalCell, p: Array) -> Array:

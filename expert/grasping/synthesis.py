@@ -3,6 +3,7 @@
 No proposal leaves as `certified` unless `expert.verify.grasp` has confirmed it.
 """
 
+import itertools
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -13,12 +14,21 @@ import numpy as np
 from expert.caging.frame import Frame
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, rotation
+from expert.grasping.decomposed import path_of, topologies
 from expert.grasping.facets import Facets
-from expert.grasping.goal_cell import Candidate, candidate, cells, region
+from expert.grasping.goal_cell import DIRECTIONS, Candidate, candidate, cells, hold, region
+from expert.grasping.nested import FacetGeometry, Grasp, schedule
 from expert.grasping.problem import GraspProblem, GraspSolution
 from expert.grasping.smooth import acceleration, smoothest
+from expert.verify.grasp import verify_grasp
 
 Method = Literal["goal_cell", "decomposed", "miqp1", "miqp2"]
+BATCH, MIP_SECONDS = 8, 5.0
+"""The decomposed search ranks so many grasps at once, and gives each choice of a topology this long [s]."""
+SHARES = (0.98, 0.75)
+"""Shares of its region of attraction that a path of the decomposed search is tried with."""
+FIRMNESS = 0.5
+"""Share of the largest moment that could hold the object in the end which smoothing must leave."""
 MOST_CHECKS = 12
 """Proposals that the checker sees before the search gives up."""
 
@@ -99,11 +109,7 @@ def _answer(search: Search, proposal: Proposal) -> GraspSolution:
 
 def _objection(problem: GraspProblem, answer: GraspSolution) -> str:
     """Why the checker does not confirm the answer; empty if it does."""
-    try:
-        from expert.verify.grasp import verify_grasp
-    except ImportError:
-        return "the checker is not available"
-    report = verify_grasp(problem, answer.path, answer.facets)
+    report = verify_grasp(problem, answer.path, answer.facets, full=False)
     return "" if report.verdict == "certified" else report.reason
 
 
@@ -129,7 +135,9 @@ def _smoothed(search: Search, known: Candidate) -> Proposal | None:
     reaches = np.concatenate([ranges[:1], ranges[:-2]])
     knots = [cell.knot(reach, limit) for reach, limit in zip(reaches, ranges[:-1], strict=True)]
     smooth_only = search.problem.cost == "acceleration"
-    path = smoothest([*knots, cell.end(ranges[-2])], None if smooth_only else known.start)
+    path = smoothest(
+        [*knots, cell.end(ranges[-2], FIRMNESS * known.firmest)], None if smooth_only else known.start
+    )
     if path is None:
         return None
     radius = search.frame.radius
@@ -137,4 +145,29 @@ def _smoothed(search: Search, known: Candidate) -> Proposal | None:
     return Proposal(path, cell.chosen, region(cell, path[0]), value)
 
 
-METHODS: dict[str, Callable[[Search], Iterator[Proposal]]] = {"goal_cell": _goal_cells}
+def _decomposed(search: Search) -> Iterator[Proposal]:
+    """Nested cages over ranked final grasps, a few at a time, each answer also with smaller starts."""
+    ranked = sorted(cells(search.table, search.problem.count, search.margin), key=lambda c: -hold(c))
+    grasps = [Grasp(cell.chosen, cell.up, cell.down) for cell in ranked]
+    geometry = FacetGeometry(search.table.vertices, search.margin)
+    knots = schedule(search.problem.half_ranges, search.margin)
+    for first in range(0, len(grasps), BATCH):
+        found = []
+        for topology in topologies(geometry, grasps[first : first + BATCH], knots, MIP_SECONDS):
+            found.append(topology)
+            if search.left <= 0:
+                break
+        for topology, share in itertools.product(sorted(found, key=lambda t: -t.value), SHARES):
+            if search.left <= 0:
+                return
+            path = path_of(geometry, topology, knots, share)
+            if path is not None:
+                starts = share * topology.alpha[:, None] * DIRECTIONS
+                value = share * topology.value * search.frame.radius
+                yield Proposal(path, topology.grasp.facets, starts, value)
+
+
+METHODS: dict[str, Callable[[Search], Iterator[Proposal]]] = {
+    "goal_cell": _goal_cells,
+    "decomposed": _decomposed,
+}

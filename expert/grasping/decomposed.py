@@ -1,0 +1,90 @@
+"""The mixed-integer search taken apart: facets first, then topology at both ends of the path, then the path itself.
+
+1. Final grasps are ranked by the moments that they can hold the object with.
+2. For each, the model with the first and the last knot only chooses pieces, turns and fillings, for the largest start.
+3. With these fixed the whole path is a convex program: least acceleration among those that keep the region of attraction.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import clarabel
+import numpy as np
+import scipy.sparse as sp
+
+from expert.geometry.pose import Array
+from expert.grasping.nested import FacetGeometry, Grasp, Knot, NestedCages
+from expert.mip.backends import StandardForm
+
+KEPT = 0.98
+"""Share of the region of attraction that smoothing leaves."""
+
+
+@dataclass(frozen=True)
+class Topology:
+    """All discrete choices of a nested-cage path, and the attraction alpha (4,) that its two end knots allow."""
+
+    grasp: Grasp
+    hubs: tuple[int, int]
+    meetings: tuple[tuple[int, int], ...]
+    pairs: tuple[tuple[int, int], ...]
+    alpha: Array
+    value: float
+
+
+def topologies(
+    geometry: FacetGeometry, grasps: Sequence[Grasp], knots: Sequence[Knot], seconds: float
+) -> Iterator[Topology]:
+    """For each grasp and filling the topology of the largest start, where its end knots exist at all."""
+    ends = [knots[0], knots[-1]]
+    count = len(grasps[0].facets)
+    fillings = [(0, 0)] if count == 3 else [(0, 0), (0, 1), (1, 0), (1, 1)]
+    for grasp in grasps:
+        for hubs in fillings:
+            model = NestedCages(geometry, [grasp], ends, hubs=hubs)
+            if not model.feasible:
+                continue
+            value = model.maximise_attraction()
+            answer = model.milp.solve("highs", time_limit=seconds)
+            if answer.x is None:
+                continue
+            x = answer.x
+            pairs = x[model.W].sum(axis=1).argmax(axis=1)
+            yield Topology(
+                grasp,
+                hubs,
+                tuple(model.keys[int(k)] for k in x[model.H].argmax(axis=1)),
+                tuple(model.pairs[int(k)] for k in pairs),
+                x[model.alpha],
+                float(x[value].sum()),
+            )
+
+
+def path_of(
+    geometry: FacetGeometry, topology: Topology, knots: Sequence[Knot], share: float = KEPT
+) -> Array | None:
+    """Smoothest path (K, N, 2) of a topology that keeps this share of its region of attraction; None where none was found."""
+    model = NestedCages(geometry, [topology.grasp], knots, hubs=topology.hubs)
+    if not model.feasible or any(key not in model.keys for key in topology.meetings):
+        return None
+    model.fix(topology.meetings, topology.pairs)
+    model.milp.at_most([(-1.0, model.alpha)], -share * topology.alpha)
+    model.minimise_acceleration()
+    x = solve_convex(model.milp.form())
+    return None if x is None else x[model.p]
+
+
+def solve_convex(form: StandardForm) -> Array | None:
+    """Minimiser of a convex quadratic program; None where the interior-point method did not reach one."""
+    A = sp.vstack([form.A, sp.eye_array(len(form.q))]).tocsr()
+    low, high = np.concatenate([form.row_low, form.low]), np.concatenate([form.row_high, form.high])
+    equal = low == high
+    below, above = ~equal & np.isfinite(low), ~equal & np.isfinite(high)
+    rows = sp.vstack([A[equal], A[above], -A[below]]).tocsc()
+    right = np.concatenate([high[equal], high[above], -low[below]])
+    cones = [clarabel.ZeroConeT(int(equal.sum())), clarabel.NonnegativeConeT(int(above.sum() + below.sum()))]
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    P = sp.triu(form.P).tocsc()
+    solution = clarabel.DefaultSolver(P, form.q, rows, right, cones, settings).solve()
+    return np.array(solution.x) if str(solution.status) == "Solved" else None
