@@ -47,7 +47,7 @@ def check(
 ) -> Checked:
     """The best plan with one of the mode sequences (k, T, C).  `model`: of this task, if it is there already."""
     model = model or model_of(task)
-    first = screen(model, np.ascontiguousarray(modes), GAP / 2, ROUNDS, False)
+    first = screen(model, modes, GAP / 2, ROUNDS, False)
     tree = Tree(model, modes.shape[2], GAP)
     best, bounds = int(first[1].argmin()), first[0]
     if np.isfinite(first[1][best]):

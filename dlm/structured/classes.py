@@ -80,7 +80,7 @@ class Schedules:
 
     def modes(self, classes: IntArray) -> IntArray:
         """Modes (k, T, C) of classes (k, 3), as in `expert.types.Plan`."""
-        return np.where(self.touching[classes[:, 0]], classes[:, None, 1:], FREE)
+        return np.ascontiguousarray(np.where(self.touching[classes[:, 0]], classes[:, None, 1:], FREE))
 
     def class_of(self, modes: IntArray) -> tuple[int, int, int] | None:
         """The class of a plan's modes (T, 2); None where the vocabulary has none."""
