@@ -38,15 +38,12 @@ from expert.verify.end_grasp import (
 from expert.verify.event_kernel import TOUCH
 from expert.verify.finger_path import FingerPath
 from expert.verify.grasp_report import Cages, DeadEnd, DeadEnds, EndGrasp, GraspReport, Verdict
-from expert.verify.reach_tube import FINEST, Flood, Tube
+from expert.verify.reach_tube import Tube, reach_tube, settled_slab
+from expert.verify.slab import uniform_ring
 from expert.verify.start_set import StartSet
 
 SPREAD = np.radians(10)
 """What can be reached may leave the first half-range by this before it counts as leaking."""
-COARSEST = 64
-"""Width of the flood's cells in the first round, in units of the cage verifier: 4 degrees."""
-DEPTH = 5
-"""How often the flood may halve a slab where it leaks."""
 
 
 def verify(task: GraspProblem, answer: GraspSolution | None = None) -> GraspReport:
@@ -169,16 +166,10 @@ class _Check:
         """What can be reached from Q0 stays bounded, meets no dead end, and is the goal alone in the end."""
         events = dead_end_events(self.path)
         deadline = time.process_time() + time_limit
-        limit = float(self.problem.half_ranges[0] + SPREAD)
-        for width in (COARSEST >> k for k in range(rounds)):
-            left = deadline - time.process_time()
-            tube = Flood(self.path, limit, width=width, depth=DEPTH, until=left).run()
-            jams = [self._dead_end(e) for e in events if tube.meets(e.s, e.first, e.last)]
-            alone = tube.closed and self._alone(tube)
-            self._record(tube, jams, len(events), alone)
-            sure = any(jam.witness is not None for jam in jams)
-            if sure or (alone and not jams) or time.process_time() > deadline:
-                break
+        tube = reach_tube(self.path, float(self.problem.half_ranges[0] + SPREAD), deadline)
+        jams = [self._dead_end(e) for e in events if tube.meets(e.s, e.first, e.last)]
+        alone = tube.closed and self._alone(tube)
+        self._record(tube, jams, len(events), alone)
         self._conclude(tube, jams, alone)
 
     def _record(self, tube: Tube, jams: list[DeadEnd], listed: int, alone: bool) -> None:
@@ -213,8 +204,8 @@ class _Check:
 
     def _alone(self, tube: Tube) -> bool:
         """Whether the contacts exclude everything but the goal among what can be reached at the end."""
-        flood = Flood(self.path, np.pi, width=FINEST, depth=0)
-        last = flood.slab(tube.slabs[-1], self.path.last, self.path.last, FINEST)
+        end, before = self.path.last, tube.slabs[-1]
+        last = settled_slab(self.path, end, end, uniform_ring(1), before.reached, np.pi)
         return last is not None and self.isolation.holds_in(last.shift, *last.range)
 
     def _dead_end(self, event: DeadEndEvent) -> DeadEnd:

@@ -9,7 +9,7 @@ import shapely
 from expert.geometry.pose import Array
 from expert.verify.cspace_cells import START, TURN, Cell, CellComplex
 from expert.verify.finger_path import FingerPath
-from expert.verify.reach_tube import signed_bounds
+from expert.verify.slab import signed_bounds
 
 WIDTH = 8
 """Of a cell, in units of the cage verifier: half a degree."""

@@ -1,0 +1,177 @@
+"""What can be reached while fingers move from one place to the next: a flood over cells of orientation, from outside.
+
+In a slab [low, high] of the path parameter the fingers stay within half their motion of the middle, so obstacles eroded
+by that much are obstacles throughout.  The components of what is left contain every free configuration of the slab, and
+a motion passes from cell to cell at a configuration that both contain.
+"""
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from expert.geometry.pose import Array
+from expert.verify.cage_search import UNIT
+from expert.verify.cspace_cells import TURN, Cell, CellComplex
+from expert.verify.finger_path import FingerPath
+
+Node = tuple[Cell, int]
+Reached = dict[Cell, list[shapely.Polygon]]
+
+
+def signed_bounds(cell: Cell) -> tuple[float, float]:
+    """First and last orientation [rad] of a cell, within half a turn of the goal."""
+    start = cell.start - TURN if cell.start >= TURN // 2 else cell.start
+    return start * UNIT, (start + cell.width) * UNIT
+
+
+def uniform_ring(width: int) -> list[Cell]:
+    """All orientations in cells of one width, in order."""
+    return [Cell(start, width) for start in range(0, TURN, width)]
+
+
+def coarsened(ring: list[Cell], most: int) -> list[Cell]:
+    """Cells that were halved are joined again, once, up to a width."""
+    joined: list[Cell] = []
+    for cell in ring:
+        last = joined[-1] if joined else None
+        siblings = last is not None and last.width == cell.width and last.start % (2 * cell.width) == 0
+        if last is not None and siblings and last.start + last.width == cell.start and 2 * cell.width <= most:
+            joined[-1] = Cell(last.start, 2 * cell.width)
+        else:
+            joined.append(cell)
+    return joined
+
+
+@dataclass(frozen=True)
+class Slab:
+    """Path parameters [low, high], the cells used, and what can be reached: polygons of positions by cell."""
+
+    low: float
+    high: float
+    ring: list[Cell]
+    reached: Reached
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Orientations reached [rad], relative to the goal."""
+        bounds = [signed_bounds(cell) for cell in self.reached]
+        return min(b[0] for b in bounds), max(b[1] for b in bounds)
+
+    @property
+    def shift(self) -> float:
+        """Largest relative distance of a position reached from the goal."""
+        corners = shapely.get_coordinates([p for polygons in self.reached.values() for p in polygons])
+        return float(np.linalg.norm(corners, axis=1).max())
+
+    def meets(self, first: Array, last: Array) -> bool:
+        """Whether it holds a configuration between two (3,) with one orientation."""
+        line, angle = segment(first, last), wrapped(first[2])
+        for cell, polygons in self.reached.items():
+            low, high = signed_bounds(cell)
+            near = low - 1e-7 <= angle <= high + 1e-7
+            if near and (shapely.distance(polygons, line) <= 1e-6).any():
+                return True
+        return False
+
+
+def segment(first: Array, last: Array) -> shapely.Geometry:
+    """Positions between two configurations."""
+    same = bool((first[:2] == last[:2]).all())
+    return shapely.Point(first[:2]) if same else shapely.LineString([first[:2], last[:2]])
+
+
+def wrapped(angle: float) -> float:
+    """The orientation within half a turn of the goal."""
+    return float((angle + np.pi) % (2 * np.pi) - np.pi)
+
+
+class SlabFlood:
+    """Components of one slab, in cells of a ring, and a flood through them."""
+
+    def __init__(self, path: FingerPath, low: float, high: float, ring: list[Cell], *, on_grid: bool) -> None:
+        motion = float(np.linalg.norm(path.fingers(high) - path.fingers(low), axis=1).max())
+        self.low, self.high, self.on_grid = low, high, on_grid
+        self.slack = 0.5 * motion
+        middle = path.arrangement(0.5 * (low + high))
+        self.space = CellComplex(middle, self.slack * path.frame.radius, on_grid=on_grid)
+        self.ring = ring
+        self.came_from: dict[Node, Node | None] = {}
+
+    def repeat_on_grid(self) -> None:
+        """Use overlays on a grid, robust and slower, from now on."""
+        self.space, self.on_grid = self.space.on_grid(), True
+
+    def flood(self, sources: Reached, limit: float) -> list[Node] | None:
+        """Fill from what is known to be entered; a way to where the object is not held, if there is one.
+
+        sources: cells of any ring, with geometries.  limit [rad]: orientations beyond it count as not held.
+        """
+        order = {cell: k for k, cell in enumerate(self.ring)}
+        queue: deque[Node] = deque()
+        self.came_from = {}
+        for cell, shapes in self._matched(sources):
+            self._enter(cell, np.array(shapes), None, queue)
+        while queue:
+            node = queue.popleft()
+            cell, k = node
+            low, high = signed_bounds(cell)
+            parts = self.space.inner(cell)
+            if parts.unbounded[k] or max(-low, high) > limit:
+                return self._way(node)
+            beside = (self.ring[order[cell] - 1], self.ring[(order[cell] + 1) % len(self.ring)])
+            for other in beside:
+                self._enter(other, parts.polygons[k : k + 1], node, queue)
+        return None
+
+    def _enter(self, cell: Cell, shapes: np.ndarray, origin: Node | None, queue: deque[Node]) -> None:
+        """Queue the components of a cell that touch any of the geometries."""
+        met = shapely.intersects(self.space.inner(cell).polygons[:, None], shapes[None]).any(axis=1)
+        for k in np.flatnonzero(met):
+            node = (cell, int(k))
+            if node not in self.came_from:
+                self.came_from[node] = origin
+                queue.append(node)
+
+    def _matched(self, sources: Reached) -> Iterable[tuple[Cell, list[shapely.Geometry]]]:
+        """Sources, by the cells of this ring whose orientations overlap theirs."""
+        starts = np.array([cell.start for cell in self.ring])
+        ends = starts + [cell.width for cell in self.ring]
+        matched: dict[Cell, list[shapely.Geometry]] = {}
+        for cell, shapes in sources.items():
+            inside = (starts < cell.start + cell.width) & (ends > cell.start)
+            for k in np.flatnonzero(inside):
+                matched.setdefault(self.ring[k], []).extend(shapes)
+        return matched.items()
+
+    def _way(self, node: Node) -> list[Node]:
+        way, current = [], self.came_from[node]
+        way.append(node)
+        while current is not None:
+            way.append(current)
+            current = self.came_from[current]
+        return way
+
+    def leaks_anyway(self, cell: Cell) -> bool:
+        """Whether the goal's position is in the unbounded component even at one orientation of a cell."""
+        parts = self.space.inner(Cell(cell.start + cell.width // 2, 0))
+        around = shapely.intersects(parts.polygons, shapely.Point(0, 0))
+        return any(parts.unbounded[k] for k in np.flatnonzero(around))
+
+    def split(self, cells: set[Cell]) -> None:
+        """Halve cells of the ring."""
+        halves = (
+            (Cell(c.start, c.width // 2), Cell(c.start + c.width // 2, c.width // 2)) for c in self.ring
+        )
+        self.ring = [
+            part for c, pair in zip(self.ring, halves, strict=True) for part in (pair if c in cells else (c,))
+        ]
+
+    def slab(self) -> Slab:
+        """What the last flood reached."""
+        reached: Reached = {}
+        for cell, k in self.came_from:
+            reached.setdefault(cell, []).append(self.space.inner(cell).polygons[k])
+        return Slab(self.low, self.high, self.ring, reached)
