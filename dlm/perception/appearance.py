@@ -16,13 +16,15 @@ MODEL_ERROR = 0.01
 """Standard deviation of what no exact coverage explains, the renderer's own errors among it [share of a pixel]."""
 FOREIGN = 25.0
 """A colour this far from every mixture of object and background is something else [grey levels]."""
+PURE = 1e-3
+"""A pixel with less of the ground shows the wall alone."""
 FAINTEST = 12.0
 """Colours differ from this distance on [grey levels]."""
 FEWEST = 8
 """Pixels that tell the object's colour."""
 CROSS = np.array([[[0, 1, 0], [1, 1, 1], [0, 1, 0]]])
-CANDIDATES = 3
-"""Every so many pixels of a frame tell of background and lighting."""
+EVERY = 6
+"""Of so many pixels one tells of background and lighting."""
 
 
 @dataclass(frozen=True)
@@ -41,18 +43,22 @@ class Appearance:
     contrast: Array
 
 
-def separate(video: Frames, camera: Camera, floor: bool) -> Appearance:
-    """Unmix a video of one object.  Raises InvalidProblem where nothing stands out from the background."""
+def separate(video: Frames, camera: Camera, floor: bool, blur: float) -> Appearance:
+    """Unmix a video of one object.  Raises InvalidProblem where nothing stands out from the background.
+
+    The object is above the floor, so that it hides the wall alone, even where a pixel or the blur mixes all three.
+    """
     images = video[:, ::-1].astype(float)
     ground = ground_coverage(camera)[::-1] if floor else np.zeros((camera.size, camera.size))
-    light, background, noise = _background(images, ground)
+    if blur > 0:
+        ground = ndimage.gaussian_filter1d(ground, blur, axis=0, mode="nearest")
+    light, wall, background, noise = _background(images, ground)
     plain = images / light[..., None]
-    thing = _object_colour(plain, background, noise)
-    line = thing - background  # (h, w, 3)
-    length = (line * line).sum(axis=-1)
+    line = _object_colour(plain, background, noise) - wall
+    length = float(line @ line)
     share = ((plain - background) * line).sum(axis=-1) / length
     off = np.linalg.norm(plain - background - share[..., None] * line, axis=-1) * light
-    contrast = light * np.sqrt(length)
+    contrast = light * length**0.5
     precision = 1 / ((noise / contrast) ** 2 + MODEL_ERROR**2)
     foreign = (off > max(6 * noise, FOREIGN)) | _half_covered_areas(share, noise / contrast)
     return Appearance(share, np.broadcast_to(precision, share.shape), foreign, noise, contrast)
@@ -69,18 +75,18 @@ def _half_covered_areas(share: Array, deviation: Array) -> NDArrayBool:
     return np.asarray(ndimage.binary_dilation(odd, np.ones((1, 3, 3))))
 
 
-def _background(images: Array, ground: Array) -> tuple[Array, Array, float]:
-    """Lighting (h, w) around 1, background under even light (h, w, 3), noise.
+def _background(images: Array, ground: Array) -> tuple[Array, Array, Array, float]:
+    """Lighting (h, w) around 1, under even light colours of the wall (3,) and of wall and ground (h, w, 3), noise.
 
     Brightness is lighting times the colour of the wall or the ground: its logarithm is a sum, fitted robustly to
     pixels of either; what is neither (the object, something in front) differs in hue or brightness and is left out.
     """
     basis = _smooth_basis(*ground.shape)
-    regions = np.stack([region for region in (ground == 0, ground == 1) if region.any()], axis=-1)
+    regions = np.stack([region for region in (ground < PURE, ground > 1 - PURE) if region.any()], axis=-1)
     count = regions.shape[-1]
     design = np.concatenate([regions.astype(float), basis], axis=-1)
-    known = np.zeros(images.shape[:3], dtype=bool)
-    known[:, 1::CANDIDATES, ::CANDIDATES] = np.any(regions, axis=-1)[1::CANDIDATES, ::CANDIDATES]
+    y, x = np.indices(ground.shape)
+    known = np.broadcast_to(np.any(regions, axis=-1) & ((x + 2 * y) % EVERY == 0), images.shape[:3])
     sample, where = images[known], np.broadcast_to(design, (*known.shape, design.shape[-1]))[known]
     region = where[:, :count].argmax(axis=-1)
     brightness = np.maximum(sample.sum(axis=-1), 1.0)
@@ -106,7 +112,7 @@ def _background(images: Array, ground: Array) -> tuple[Array, Array, float]:
         sample - (even * 0 + np.array(colours)[region]) * np.broadcast_to(light, known.shape)[known][:, None]
     )[near]
     noise = 1.4826 * float(np.median(np.abs(off - np.median(off, axis=0))))
-    return light, background, max(noise, LEAST_NOISE)
+    return light, colours[0], background, max(noise, LEAST_NOISE)
 
 
 def _smooth_basis(height: int, width: int) -> Array:

@@ -6,7 +6,7 @@ import numba
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from dlm.perception.raster import coverage
+from dlm.perception.raster import coverage, is_simple
 from expert.geometry.polygon import NDArrayBool
 from expert.geometry.pose import Array, rotation
 
@@ -14,6 +14,8 @@ LONGEST_STEP = 1.0
 """No vertex moves further than this in one iteration [pixels]: the outline sees only the pixels that it crosses."""
 
 
+LEAST_DAMPING = 1e-4
+"""Corners that hardly bend the outline are free to slide along it: no step follows such a direction far."""
 FAR = 0.3
 """Errors of coverage beyond this and the noise are due to something else than the outline."""
 
@@ -188,8 +190,9 @@ def fit(
         step[free] = _damped_step(here.matrix[free, free], here.gradient[free], damping)
         longest = np.abs(scene.moved(step).placed() - scene.placed()).max()
         trial = scene.moved(step * min(1.0, LONGEST_STEP / max(longest, 1e-12)))
-        there = quadratic(trial, seen)
-        if there.cost >= here.cost:
+        # An outline that crosses itself stands for no object: such a step counts as one uphill.
+        there = quadratic(trial, seen) if is_simple(trial.vertices) else None
+        if there is None or there.cost >= here.cost:
             if damping > 1e4 or longest < 1e-6:
                 break
             damping *= 8
@@ -203,5 +206,5 @@ def fit(
 
 def _damped_step(matrix: Array, gradient: Array, damping: float) -> Array:
     diagonal = np.diag(matrix)
-    floor = 1e-6 * diagonal.mean() + 1e-12
+    floor = LEAST_DAMPING * diagonal.mean() + 1e-12
     return np.asarray(-np.linalg.solve(matrix + np.diag(damping * diagonal + floor), gradient))

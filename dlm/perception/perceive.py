@@ -14,6 +14,8 @@ from expert.errors import InvalidProblem
 from expert.geometry.polygon import mass_properties
 from expert.geometry.pose import Array, to_body
 
+MARGIN = 4
+"""Pixels around the object that are looked at; more where the image is blurred."""
 STARTS = 3
 POOR = 9.0
 """Mean square of the errors over that of the noise beyond which another start is tried."""
@@ -28,8 +30,8 @@ def perceive(
     """
     camera, settings = camera or Camera(), settings or PerceptionSettings()
     check_video(video, camera)
-    look = separate(video, camera, settings.floor)
-    windows = segment(look)
+    look = separate(video, camera, settings.floor, settings.blur)
+    windows = segment(look, MARGIN + int(np.ceil(3 * settings.blur)))
     seen = _observation(look, windows, settings)
     scene, seen = _best_start(seen, settings)
     scene, _ = prune(scene, seen)

@@ -72,3 +72,29 @@ def _crossings(start: float, extent: float) -> tuple[float, float]:
     if extent < 0:
         return (start - np.ceil(start) + 1.0) / -extent, -1.0 / extent
     return np.inf, np.inf
+
+
+SHARPEST = 0.1
+"""Corners are wider than this [rad]."""
+
+
+@numba.njit(cache=True)
+def is_simple(vertices: Array) -> bool:
+    """Whether no two edges of a polygon (V, 2) cross, and none folds back on the one before."""
+    count = len(vertices)
+    for i in range(count):
+        a, b, c = vertices[i], vertices[(i + 1) % count], vertices[(i + 2) % count]
+        back, along = b - a, c - b
+        fold = np.arctan2(abs(back[0] * along[1] - back[1] * along[0]), -(back[0] * along[0] + back[1] * along[1]))
+        if fold < SHARPEST:
+            return False
+        for j in range(i + 2, count if i > 0 else count - 1):
+            c, d = vertices[j], vertices[(j + 1) % count]
+            if _side(a, b, c) * _side(a, b, d) <= 0 and _side(c, d, a) * _side(c, d, b) <= 0:
+                return False
+    return True
+
+
+@numba.njit(cache=True)
+def _side(a: Array, b: Array, c: Array) -> float:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

@@ -13,7 +13,6 @@ SMALLEST = 12
 """Fewest pixels that make an object."""
 RIVAL = 0.15
 """A second piece of this share of the object's area is another object."""
-MARGIN = 4
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,7 @@ class Windows:
         )
 
 
-def segment(look: Appearance) -> Windows:
+def segment(look: Appearance, margin: int) -> Windows:
     """The object's pixels.  Raises InvalidProblem for several objects, or one that is not wholly in view in every frame."""
     masks = np.stack([_one_object(look, t) for t in range(len(look.share))])
     areas = masks.sum(axis=(1, 2))
@@ -48,7 +47,7 @@ def segment(look: Appearance) -> Windows:
                 got=f"one that leaves frame {t}",
                 remedy="move the camera back or cut the clip",
             )
-    return _windows(masks)
+    return _windows(masks, margin)
 
 
 def _one_object(look: Appearance, t: int) -> np.ndarray:
@@ -74,13 +73,13 @@ def _one_object(look: Appearance, t: int) -> np.ndarray:
     return thing & (pieces == order[0])
 
 
-def _windows(masks: np.ndarray) -> Windows:
+def _windows(masks: np.ndarray, margin: int) -> Windows:
     boxes = []
     for mask in masks:
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         boxes.append((columns[0], rows[0], columns[-1] + 1, rows[-1] + 1))
     low, high = np.array(boxes)[:, :2], np.array(boxes)[:, 2:]
     limits = np.array(masks.shape[:0:-1])
-    width, height = np.minimum((high - low).max(axis=0) + 2 * MARGIN, limits)
+    width, height = np.minimum((high - low).max(axis=0) + 2 * margin, limits)
     origins = np.clip((low + high - [width, height]) // 2, 0, limits - [width, height])
     return Windows(origins, int(height), int(width), masks)
