@@ -44,18 +44,17 @@ UNITS = np.array([1e-3, 1e-3, 5e-4, 0.5, 0.1, 0.1, 0.04])
 """Changes of about equal effect."""
 STAYS = 2e-5
 """Gaps and slips below this count as zero [m]."""
+SHARPEST = 0.1
+"""1 + cos of the sharpest turn of an outline that is moved in as far as it should be."""
 
 
 def deflated(perceived: Perceived, distance: float) -> Perceived:
-    """What casts an outline blown up by `distance` [m], seen over a floor that was taken to lie as much lower.
-
-    What touched the floor touches it, and what stayed in its place on it stays there.
-    """
+    """What casts an outline blown up by `distance` [m]; what touched the floor touches it, what stayed in its place on it stays."""
     if distance == 0:
         return perceived
-    vertices = _inset(perceived.vertices, distance)
+    vertices = inset(perceived.vertices, distance)
     before = to_world(perceived.poses, perceived.vertices)
-    poses = perceived.poses - [0.0, distance, 0.0]
+    poses = perceived.poses.copy()
     touching = before[..., 1] <= STAYS  # (T, V)
     for t in range(len(poses)):
         if touching[t].any():
@@ -69,8 +68,9 @@ def deflated(perceived: Perceived, distance: float) -> Perceived:
     return replace(perceived, vertices=vertices, poses=poses)
 
 
-def _inset(vertices: Array, distance: float) -> Array:
-    """Every side moved inwards."""
+def inset(vertices: Array, distance: float) -> Array:
+    """Every side (V, 2) moved inwards; a negative distance moves it out."""
     normal, _ = facet_frames(vertices)
     before = np.roll(normal, 1, axis=0)
-    return vertices + distance * (normal + before) / (1 + (normal * before).sum(axis=1, keepdims=True))
+    spread = 1 + (normal * before).sum(axis=1, keepdims=True)
+    return vertices + distance * (normal + before) / np.maximum(spread, SHARPEST)

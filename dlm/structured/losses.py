@@ -13,6 +13,7 @@ from dlm.execution import idle_where_unsolved, simulate
 from dlm.metrics import object_trajectory_loss
 from dlm.models import Policy
 from dlm.simulator import SimulatorSettings
+from dlm.structured.bias import Bias
 from dlm.structured.calibration import Calibration
 from dlm.structured.check import ROUNDS, screen
 from dlm.structured.classes import Schedules
@@ -69,11 +70,13 @@ class CheckedClassLoss:
     """Cross-entropy, and the cost that the program finds for the classes, the structured counterpart of 4-CT7.
 
     The second part, times regret_weight, is the mean of log(1 + regret) under the scorer's probabilities; the regret of a
-    class is its optimum over the best class's, less one.
+    class is its optimum over the best class's, less one.  Checking every class takes a while, once per task: only tasks
+    numbered below regret_tasks take part in it.
     """
 
     classes: ClassLoss = field(default_factory=ClassLoss)
     regret_weight: float = 1.0
+    regret_tasks: int = 2000
     known: dict[int, Array] = field(default_factory=dict, repr=False, compare=False)
 
     def __call__(self, policy: Policy, tasks: TaskBatch) -> Tensor:
@@ -103,14 +106,23 @@ def regrets(sample: Sample, schedules: Schedules) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrationLoss:
-    """4-CT10 as a function of the calibration, differentiated by central differences of `step` units through everything."""
+    """4-CT10 as a function of the calibration, differentiated by central differences of `step` units through everything.
+
+    prior: price of a knob's square, so that knobs without effect stay where they are.  bias: the videos are seen anew by
+    such a camera.
+    """
 
     simulator: SimulatorSettings
     step: float = 0.25
+    prior: float = 1e-4
+    bias: Bias | None = None
 
     def __call__(self, policy: Policy, tasks: TaskBatch) -> Tensor:
         proposing = proposer(policy)
-        return _Differences.apply(proposing.knobs, proposing, tasks, self)
+        if self.bias is not None:
+            tasks = self.bias.videos(tasks, proposing.base.camera)
+        simulated = _Differences.apply(proposing.knobs, proposing, tasks, self)
+        return simulated + self.prior * proposing.knobs.square().sum()
 
     def at(self, policy: ProposalPolicy, tasks: TaskBatch, knobs: Array) -> float:
         """Mean object-trajectory loss [cm^2]; tasks without a plan count as what idle fingers do."""

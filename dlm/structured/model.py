@@ -104,9 +104,8 @@ class StructuredModel:
 
     def act(self, video: Frames) -> Planned:
         """Perceive and plan.  Raises InvalidProblem for a video without one object that stays in view."""
-        below = max(self.camera.below - self.inflation, 0.0)  # the blown-up object reaches below the floor
-        seen = self.perceive(video, replace(self.camera, below=below), self.perception)
-        return self.plan(deflated(seen, self.camera.below - below))
+        seen = self.perceive(video, self.camera, self.perception)
+        return self.plan(deflated(seen, self.inflation))
 
     def plan(self, perceived: Perceived) -> Planned:
         """Plan for perceived geometry.  Raises InvalidProblem for another number of frames than planned for."""

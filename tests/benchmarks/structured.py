@@ -255,7 +255,7 @@ def main() -> int:
         table.add_row(row["model"], row["kind"], row["disturbance"], *numbers)
     Console(width=150).print(table)
     for row in rows:
-        for one in row["missed"]:
+        for one in row["missed"] if row["model"] in MODELS else []:
             print(
                 f"{row['model']}, {row['kind']}, {row['disturbance']}, task {one['index']} ({one['family']}): loss "
                 f"{one['loss']:.3g}, {one['mm']:.1f} mm, {one['deg']:.1f} deg, {one['status']}; {one['cause']}"
