@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 
 from expert.caging.problem import CageProblem, Gripper
+from expert.caging.requirements import TRIPOD
 from expert.geometry.polygon import facet_frames, facets, reflex_vertices, signed_distance
 from expert.geometry.pose import Array, cross, rotation, to_body
 
@@ -21,6 +22,8 @@ CLEARANCES = (0.03, 0.015, 0.008, 0.005)
 """Of fingers from the object, relative to its size, in this order."""
 NEAR = 0.1
 """Walls and fixed fingers within this distance, relative to the object's size, count as contacts."""
+FAR = 0.25
+"""The same for fingers of one-parameter grippers."""
 FIRM = 0.03
 """Every unit twist (torques relative to half the object's size) must be opposed by at least this much."""
 TWISTS, LEVELS, MOST, BEST = 200, 24, 60_000, 12
@@ -62,6 +65,8 @@ class Closures:
     ) -> list[tuple[float, Array]]:
         """(firmness, fingers) of the best combinations of placements."""
         problem = self.problem
+        if problem.cost == "max_opening" and problem.count == 3:
+            return self._tripods(clearance)
         sites = self._sites(clearance)
         held = [k for gripper in problem.grippers for k in gripper.fingers]
         alone = [k for k in range(problem.count) if k not in held]
@@ -112,6 +117,27 @@ class Closures:
             fits = (length >= least) & (length <= most) & (step @ axis > 0 if self.problem.parallel else True)
             pairs.append(np.stack([points[i[fits]], points[j[fits]]], axis=1))
         return self._placed(np.concatenate(pairs), clearance)
+
+    def _tripods(self, clearance: float) -> list[tuple[float, Array]]:
+        """(firmness, fingers) of one-parameter grippers whose fingers each stay clear of one facet, as three equations say.
+
+        What each finger opposes is judged from afar: three contacts do not hold an object, but a reflex corner counts twice.
+        """
+        outward = -self.inward
+        offsets = (outward * self.vertices).sum(axis=1) + clearance
+        u = TRIPOD @ rotation(-self.problem.pose[2]).T
+        triples = np.array(list(itertools.product(range(len(offsets)), repeat=3)))
+        n = outward[triples]
+        equations = np.concatenate([n, (n * u).sum(axis=2, keepdims=True)], axis=2)
+        regular = np.abs(np.linalg.det(equations)) > 1e-6
+        solved = np.linalg.solve(equations[regular], offsets[triples[regular]][..., None])[..., 0]
+        fingers = solved[:, None, :2] + solved[:, 2, None, None] * u
+        clear = (signed_distance(self.vertices, fingers) > 0.5 * clearance).all(axis=1) & (solved[:, 2] > 0)
+        near = np.linalg.norm(fingers - self.centre, axis=2).max(axis=1) < 2 * self.size
+        fingers = fingers[clear & near]
+        push = self._push(fingers.reshape(-1, 2), FAR * self.size).reshape(-1, 3, TWISTS).max(axis=1)
+        firmness = np.maximum(push, self.given).min(axis=1)
+        return [(float(f), x) for f, x in zip(firmness, fingers, strict=True) if f > FIRM]
 
     def _lines(self, direction: float, clearance: float) -> list[Array]:
         """Points near the object on lines across it: off each facet that a line meets, and along those it runs beside."""

@@ -16,6 +16,7 @@ from expert.caging.closures import Closures, directions
 from expert.caging.frame import Frame
 from expert.caging.immobilise import candidates
 from expert.caging.model import SweptModel
+from expert.caging.polish import STEPS, improvements
 from expert.caging.problem import Arrangement, CageProblem
 from expert.caging.requirements import objective, require
 from expert.caging.rings import break_symmetry, hubs, labelled, rings
@@ -194,10 +195,13 @@ def _search_ranges(tally: Tally, method: Method, solver: Solver) -> None:
     for attempt in _attempts(tally.problem, method):
         if tally.left <= 0 or tally.done:
             return
+        before = tally.best
         if attempt is None:
             _try_grasps(tally)
         else:
             _try_models(tally, attempt, solver)
+        if tally.best is not before and not tally.done:
+            _polish(tally)
 
 
 def _judge_fixed(tally: Tally) -> None:
@@ -247,17 +251,40 @@ def _attempts(problem: CageProblem, method: Method) -> Iterator[Attempt | None]:
 def _try_grasps(tally: Tally) -> None:
     """Cages around immobilising grasps that hold even where each finger is off by half the margin."""
     problem = tally.problem
+    for fingers in _grasps(problem, np.random.default_rng(0)):
+        if tally.left <= 0 or tally.best.found:
+            return
+        _try(tally, to_world(problem.pose, fingers), 400)
+
+
+def _polish(tally: Tally) -> None:
+    """Steps of ever smaller size to a lower cost, each to a verified cage."""
+    problem, rng = tally.problem, np.random.default_rng(0)
+    sizes = [share * problem.shape.size for share in STEPS]
+    while sizes and tally.left > 0:
+        before = tally.best
+        for fingers in improvements(problem, before.fingers, sizes[0], rng):
+            _try(tally, fingers, 150)
+            if tally.best is not before or tally.left <= 0:
+                break
+        else:
+            sizes.pop(0)
+
+
+def _try(tally: Tally, fingers: Array, cell_budget: int) -> None:
+    """Keep fingers (count, 2) [m] if they cage the object even where each is off by half the margin.
+
+    Undecided within the budget of the verifier is not good enough, and not counted: nothing was claimed.
+    """
+    problem = tally.problem
     slack = 0.5 * problem.margin * problem.shape.size
-    rng = np.random.default_rng(0)
-    for fingers in _grasps(problem, rng):
-        if tally.left <= 0:
-            return
-        tally.attempts += 1
-        placed = to_world(problem.pose, fingers)
-        report = verify_cage(problem.arrangement(placed), slack=slack, cell_budget=400)
-        if report.verdict == "caged":
-            tally.keep(placed, report)
-            return
+    tally.attempts += 1
+    try:
+        report = verify_cage(problem.arrangement(fingers), slack=slack, cell_budget=cell_budget)
+    except InvalidProblem:  # inside the object
+        return
+    if report.verdict == "caged":
+        tally.keep(fingers, report)
 
 
 def _restricted(problem: CageProblem) -> bool:
@@ -266,9 +293,8 @@ def _restricted(problem: CageProblem) -> bool:
 
 def _grasps(problem: CageProblem, rng: np.random.Generator) -> Iterator[Array]:
     """Fingers (count, 2) in the body frame, close to where they hold the object."""
-    if problem.cost == "max_opening" and problem.count == 3:
-        return  # a tripod is no free choice of three points
-    if _restricted(problem):
+    tripod = problem.cost == "max_opening" and problem.count == 3
+    if _restricted(problem) or tripod:
         yield from Closures(problem).candidates(rng)
     else:
         for fingers in candidates(problem.shape.vertices, problem.count, problem.shape.size, rng):
