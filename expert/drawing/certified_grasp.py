@@ -33,7 +33,8 @@ from expert.verify.start_set import StartSet
 START, GOAL, PATH = "#8d8678", "#7a3db8", "#1f5fbf"
 """Grey starts, purple goal, blue finger paths, as in the thesis's Fig. 5-28."""
 RUNS, SHOWN = 60, 12
-RATE, HOLD = 15.0, 12
+RATE, FRAMES, HOLD = 12.0, 32, 10
+"""Of an animation: frames per second, and how many move and then stand."""
 
 
 def draw(task: GraspProblem, answer: GraspSolution | None, path: str | os.PathLike[str]) -> None:
@@ -134,17 +135,18 @@ def draw_moment(axes: Axes, task: GraspProblem, answer: GraspSolution, runs: Swe
     """Some of the runs on top of each other, and the fingers, at path parameter s."""
     sample = int(np.abs(runs.s - s).argmin())
     for pose in runs.poses[:SHOWN, sample]:
-        axes.fill(*_outline(task, pose).T, color=(*to_rgb(OBJECT), 0.25), ec=(*to_rgb(EDGE), 0.6), lw=0.6)
+        axes.fill(*_outline(task, pose).T, color=(*to_rgb(OBJECT), 0.25), lw=0)
+        axes.plot(*_outline(task, pose).T, color=EDGE, lw=0.6, alpha=0.7)
     axes.plot(*_outline(task, task.pose).T, "--", color=GOAL, lw=0.8)
     axes.plot(*answer.fingers(s).T, "o", color=FINGER, ms=4, zorder=4)
     plain_axes(axes, *_view(task, answer, runs))
 
 
 def _frames(task: GraspProblem, answer: GraspSolution, runs: Sweep) -> Iterator[Image8]:
-    figure = new_figure(3.4, 3.4)
+    figure = new_figure(2.8, 2.8)
     axes = figure.add_subplot()
     image = None
-    for s in runs.s[:: max(1, len(runs.s) // 50)]:
+    for s in runs.s[:: max(1, len(runs.s) // FRAMES)]:
         axes.clear()
         draw_moment(axes, task, answer, runs, float(s))
         image = pixels(figure)

@@ -159,14 +159,15 @@ def _choose(facets: np.ndarray, fingers: np.ndarray, q: np.ndarray, which: np.nd
         dx, dy = fingers[n, 0] - q[0], fingers[n, 1] - q[1]
         bx, by = cs * dx + sn * dy, cs * dy - sn * dx
         for f in range(V):
-            gap = _gap(facets, f, bx, by)
-            if not np.isfinite(gap):
+            gap = _height(facets, f, bx, by)
+            along = (bx - facets[f, 0]) * facets[f, 4] + (by - facets[f, 1]) * facets[f, 5]
+            if abs(gap) > REACH or along < -REACH or along > facets[f, 6] + REACH:
                 continue
             before, after = (f - 1) % V, (f + 1) % V
             # At a convex corner it is enough to be outside of one facet: keep the one that is farther.
-            if facets[f, 7] == 0 and _gap_or(facets, before, bx, by) >= gap:
+            if facets[f, 7] == 0 and _height(facets, before, bx, by) >= gap:
                 continue
-            if facets[after, 7] == 0 and _gap_or(facets, after, bx, by) > gap:
+            if facets[after, 7] == 0 and _height(facets, after, bx, by) > gap:
                 continue
             if count < CONTACTS:
                 which[count, 0], which[count, 1] = n, f
@@ -175,20 +176,9 @@ def _choose(facets: np.ndarray, fingers: np.ndarray, q: np.ndarray, which: np.nd
 
 
 @njit(cache=True, error_model="numpy")
-def _gap(facets: np.ndarray, f: int, x: float, y: float) -> float:
-    """Signed distance of a body point from the line of a facet; infinite where the facet is out of reach."""
-    dx, dy = x - facets[f, 0], y - facets[f, 1]
-    gap = dx * facets[f, 2] + dy * facets[f, 3]
-    along = dx * facets[f, 4] + dy * facets[f, 5]
-    near = abs(gap) <= REACH and -REACH <= along <= facets[f, 6] + REACH
-    return gap if near else np.inf
-
-
-@njit(cache=True, error_model="numpy")
-def _gap_or(facets: np.ndarray, f: int, x: float, y: float) -> float:
-    """As `_gap`, but minus infinity out of reach."""
-    gap = _gap(facets, f, x, y)
-    return gap if np.isfinite(gap) else -np.inf
+def _height(facets: np.ndarray, f: int, x: float, y: float) -> float:
+    """Signed distance of a body point from the line of a facet."""
+    return (x - facets[f, 0]) * facets[f, 2] + (y - facets[f, 1]) * facets[f, 3]
 
 
 @njit(cache=True, error_model="numpy")
