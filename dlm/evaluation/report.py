@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from dlm.evaluation.extras import Extra, chart
 from dlm.evaluation.style import STYLE
-from dlm.evaluation.table import DATASETS, DETAILS, Cell, Table, comparison_rows
+from dlm.evaluation.table import DATASETS, DETAILS, Cell, Table, comparison_rows, order_rows
 
 INTRODUCTION = """
 Videos of a moving polygon go in, positions and forces of two point fingers come out. Every architecture sees the same videos,
@@ -29,6 +29,7 @@ Each row asks whether the second architecture does better than the first on the 
 Δ: mean loss of the second minus the first, with its 95 % bootstrap interval. p: Wilcoxon's signed ranks (does one side win on
 most tasks?) and random sign flips (is the mean difference zero?), two-sided, corrected by Holm's method over all rows here.
 """
+ORDER = "Does the thesis's order appear, losses falling from NN to MDR to CVX to DLM?"
 FILMS = """
 Dashed: demonstrated motion. Filled: the object in the simulator. Dots: fingers. In the frame-by-frame strips, lines are forces;
 in rows called <i>derendered</i>, coloured segments are the facets that the network assigns to each finger (faint while not
@@ -102,7 +103,8 @@ class Report:
             + "</div>"
             for name in names
         ]
-        return _note(TESTS) + "".join(parts)
+        order = _grid(*order_rows(self.table.comparisons)) if parts else ""
+        return f"<h3>{ORDER}</h3>" + order + _note(TESTS) + "".join(parts)
 
     def _origin(self) -> str:
         rows = "".join(

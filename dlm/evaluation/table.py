@@ -4,6 +4,7 @@ import csv
 import io
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -127,7 +128,15 @@ class Table:
     def _tests(self) -> list[str]:
         """Sections of the paired tests, one per data set."""
         names = dict.fromkeys(c.dataset for c in self.comparisons)
-        return [
+        order = (
+            [
+                "Does the thesis's order appear, losses falling from NN to MDR to CVX to DLM?\n\n"
+                + _grid(*order_rows(self.comparisons))
+            ]
+            if self.comparisons
+            else []
+        )
+        return order + [
             f"Paired tests, {DATASETS[name]}: loss of the second minus the first; p values corrected (Holm) over all data sets\n\n"
             + _grid(*comparison_rows([c for c in self.comparisons if c.dataset == name]))
             for name in names
@@ -164,6 +173,19 @@ def comparison_rows(comparisons: Sequence[Comparison]) -> tuple[list[str], list[
         for c in comparisons
     ]
     return head, rows
+
+
+THESIS_ORDER = ("NN", "MDR", "CVX", "DLM")
+"""Of falling loss in the thesis, on every data set."""
+
+
+def order_rows(comparisons: Sequence[Comparison]) -> tuple[list[str], list[list[str]]]:
+    """Heading and rows: does each step of the thesis's order appear?"""
+    found = {(c.first, c.second, c.dataset): c.verdict for c in comparisons}
+    names = list(dict.fromkeys(c.dataset for c in comparisons))
+    steps = [pair for pair in pairwise(THESIS_ORDER) if any(key[:2] == pair for key in found)]
+    rows = [[f"{b} against {a}", *(found.get((a, b, d), "–") for d in names)] for a, b in steps]
+    return ["", *(DATASETS.get(d, d) for d in names)], rows
 
 
 def _signed(value: float) -> str:
