@@ -74,20 +74,23 @@ def verify_cage(
     range_resolution: float = np.radians(0.5),
     finest: float = np.radians(1 / 32),
     cell_budget: int = 3000,
+    within: tuple[float, float] | None = None,
 ) -> CageReport:
     """Decide whether the object can leave its obstacles.
 
     slack: length [m] by which every finger may be elsewhere and a cage still be a cage; escapes are those of the fingers
     as given.  range_resolution: width [rad] to which the ends of a cage's rotation range are located.  finest: smallest
     half-width [rad] of a cell (1/32 degree at least).  cell_budget: cells after which the answer is UNKNOWN.
+    within: orientations [rad], relative to the start, that the cage is expected to keep: looked at more closely where it
+    seems to leave them.
     """
     began = time.perf_counter()
     search = CageSearch(arrangement, slack, max(1, round(2 * finest / UNIT)))
-    verdict, path = search.run(range_resolution, cell_budget)
+    verdict, path = search.run(range_resolution, cell_budget, within)
     doubted = search.faults > 0 if verdict == "unknown" else verdict == "caged" and not search.holds_on_grid()
     if doubted:
         search = CageSearch(arrangement, slack, search.finest, on_grid=True)
-        verdict, path = search.run(range_resolution, cell_budget)
+        verdict, path = search.run(range_resolution, cell_budget, within)
     return CageReport(
         verdict=verdict,
         cells=search.complex.evaluated,

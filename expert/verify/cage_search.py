@@ -39,8 +39,13 @@ class CageSearch:
         self.faults = 0
         self._links: dict[tuple, list[list[int]]] = {}
 
-    def run(self, range_resolution: float, cell_budget: int) -> tuple[Verdict, Array]:
-        """Refine until a flood of the inner components stays bounded or one of the outer components escapes."""
+    def run(
+        self, range_resolution: float, cell_budget: int, within: tuple[float, float] | None = None
+    ) -> tuple[Verdict, Array]:
+        """Refine until a flood of the inner components stays bounded or one of the outer components escapes.
+
+        within [rad], relative to the start: a cage that seems to reach beyond is refined where it leaves this range.
+        """
         nowhere = np.empty((0, 3))
         for turn in range(MOST_ROUNDS):
             if self.complex.evaluated >= cell_budget:
@@ -48,6 +53,7 @@ class CageSearch:
             route = self.candidate_escape()
             if route is None:
                 blunt = self.blunt_ends(range_resolution)
+                blunt |= self.leading_beyond(within) if within and not blunt else set()
                 if not blunt:
                     return "caged", nowhere
                 self.split(blunt)
@@ -94,8 +100,11 @@ class CageSearch:
             route = self.flood()
         return route
 
-    def flood(self) -> list[Node] | None:
-        """Components from the start to infinity, neighbours in touch, or None; `reached` are the cells seen."""
+    def flood(self, beyond: frozenset[Cell] = frozenset()) -> list[Node] | None:
+        """Components from the start to infinity or into cells `beyond`, neighbours in touch, or None.
+
+        `reached` are the cells seen.
+        """
         at_start = shapely.intersects(self.parts(START).polygons, shapely.Point(0, 0))
         queue = deque((START, int(k)) for k in np.flatnonzero(at_start))
         came_from: dict[Node, Node | None] = dict.fromkeys(queue)
@@ -103,7 +112,7 @@ class CageSearch:
         while queue:
             cell, k = queue.popleft()
             self.reached.add(cell)
-            if self.parts(cell).unbounded[k]:
+            if cell in beyond or self.parts(cell).unbounded[k]:
                 return _trace(came_from, (cell, k))
             for neighbour in {self.ahead[cell], self.behind[cell]}:
                 for j in self.links(cell, neighbour)[k]:
@@ -189,6 +198,17 @@ class CageSearch:
             return set()
         ends = {self._last(self.ahead), self._last(self.behind)}
         return {c for c in ends if c.width > max(resolution / UNIT, self.finest)}
+
+    def leading_beyond(self, within: tuple[float, float]) -> set[Cell]:
+        """Cells that may be halved on the way to orientations outside `within`."""
+        low, high = within
+        outside = frozenset(
+            c for c in self.reached if c.bounds[0] >= high - 1e-9 and c.bounds[1] <= 2 * np.pi + low + 1e-9
+        )
+        seen = self.reached
+        route = self.flood(outside) if outside else None
+        self.reached = seen
+        return {cell for cell, _ in route or [] if cell.width > self.finest}
 
     def _last(self, onward: dict[Cell, Cell]) -> Cell:
         cell = START

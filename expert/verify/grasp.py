@@ -148,7 +148,8 @@ class _Check:
         """Nested cages at the knots."""
         ranges = np.full((len(self.path.knots), 2), np.nan)
         for k in range(len(ranges)):
-            report = verify_cage(self.path.arrangement(k), range_resolution=1.01 * UNIT)
+            half = float(self.problem.half_ranges[k])
+            report = verify_cage(self.path.arrangement(k), range_resolution=1.01 * UNIT, within=(-half, half))
             if report.rotation_range is not None:
                 ranges[k] = np.array(report.rotation_range) - self.problem.pose[2]
             elif report.verdict == "escapes":
