@@ -20,18 +20,29 @@ from expert.grasping.rows import Rows
 LEAST_MOMENT = 0.05
 """Moment (relative length) that each of the two rays must have at the end, in opposite senses."""
 OVERLAP = 2.0
+"""Where two fingers bound the cell next to each other their obstacles overlap by so many margins."""
 LEAST_SINE = 0.1
+"""Facets at a smaller angle count as if they had this one."""
+NARROW = np.radians(3)
+"""Half-range below which clearances shrink with it."""
+CURVATURE_SHARE = 0.2
+"""Share of the clearance that three fingers' curvature leaves which each condition keeps."""
 
 
 @dataclass(frozen=True)
 class GoalCell:
-    """Facets of the fingers, sorted by normal angle, and which rays end the cell above (up) and below (down) the goal."""
+    """Facets of the fingers, sorted by normal angle, and which rays end the cell above (up) and below (down) the goal.
+
+    Three fingers have one ray, and hold the object by its curvature where their normals meet in a point.
+    jaws: what grippers ask of the fingers at every knot.
+    """
 
     table: Facets
     chosen: tuple[int, ...]
     up: int
     down: int
     margin: float
+    jaws: Rows | None = None
 
     @property
     def count(self) -> int:
@@ -116,26 +127,43 @@ class GoalCell:
         high = wedge.b - self.margin - wedge.A @ constant
         return Rows(V, np.full(len(high), -np.inf), high)
 
+    @property
+    def concurrent(self) -> bool:
+        """Whether one ray shuts the cell both above and below the goal."""
+        return self.up == self.down
+
+    def slack(self, limit: float) -> float:
+        """Clearance that is left at a knot with this half-range: the nearer to the end the less."""
+        if self.concurrent:
+            return min(self.margin, CURVATURE_SHARE * float(self.E[self.up]) * (1 - np.cos(limit)))
+        return self.margin * min(1.0, np.sin(limit) / np.sin(NARROW))
+
     def knot(self, reach: float, limit: float) -> Rows:
         """Conditions at a knot before the last: on arrival the object is within +-reach, on departure within +-limit."""
-        eps = self.margin * min(1.0, np.sin(limit) / np.sin(np.radians(3)))
+        eps = self.slack(limit)
         parts = [self.contacts.over(-reach, reach), _raised(self.clearance().at(0.0), eps)]
         for k, side in ((self.up, 1.0), (self.down, -1.0)):
             below = self.ray_rows(k, -np.inf, -eps)
             falling = Rows(side * below.V, np.array([-np.inf]), np.array([0.0]))
             parts += [below.at(side * limit), below.at(side * reach), falling.slope(side * limit)]
-        return Rows.join(parts)
+        return self._with_jaws(parts)
 
     def end(self, reach: float, moment: float = LEAST_MOMENT) -> Rows:
         """Conditions at the last knot: all fingers touch at the goal, and the rays' moments hold it (form closure)."""
-        eps = self.margin * min(1.0, np.sin(reach) / np.sin(np.radians(3)))
+        eps = self.slack(reach)
         touch = self.clearance().at(0.0)
         parts = [self.contacts.over(-reach, reach), Rows(touch.V, touch.low, touch.low)]
+        if self.concurrent:
+            level = self.moments()
+            return self._with_jaws([*parts, Rows(level.V[:1], np.zeros(1), np.zeros(1))])
         for k, side in ((self.up, 1.0), (self.down, -1.0)):
             below = self.ray_rows(k, -np.inf, -eps)
             falling = Rows(side * below.V, np.array([-np.inf]), np.array([-moment]))
             parts += [below.at(side * reach), falling.slope(0.0)]
-        return Rows.join(parts)
+        return self._with_jaws(parts)
+
+    def _with_jaws(self, parts: list[Rows]) -> Rows:
+        return Rows.join([*parts, self.jaws] if self.jaws is not None else parts)
 
     def moments(self) -> Rows:
         """f'(0) >= 0 of the ray that shuts the cell below, -f'(0) >= 0 of the one above."""

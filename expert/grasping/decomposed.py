@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from expert.geometry.pose import Array
+from expert.grasping.goal_cell import MIN_WEIGHT, SUM_WEIGHT
 from expert.grasping.nested import FacetGeometry, Grasp, Knot, NestedCages
 from expert.mip.backends import StandardForm
 
@@ -33,31 +34,31 @@ class Topology:
 
 
 def topologies(
-    geometry: FacetGeometry, grasps: Sequence[Grasp], knots: Sequence[Knot], seconds: float
+    geometry: FacetGeometry, grasp: Grasp, knots: Sequence[Knot], seconds: float
 ) -> Iterator[Topology]:
-    """For each grasp and filling the topology of the largest start, where its end knots exist at all."""
-    ends = [knots[0], knots[-1]]
-    count = len(grasps[0].facets)
-    fillings = [(0, 0)] if count == 3 else [(0, 0), (0, 1), (1, 0), (1, 1)]
-    for grasp in grasps:
-        for hubs in fillings:
-            model = NestedCages(geometry, [grasp], ends, hubs=hubs)
-            if not model.feasible:
-                continue
-            value = model.maximise_attraction()
-            answer = model.milp.solve("highs", time_limit=seconds)
-            if answer.x is None:
-                continue
-            x = answer.x
-            pairs = x[model.W].sum(axis=1).argmax(axis=1)
-            yield Topology(
-                grasp,
-                hubs,
-                tuple(model.keys[int(k)] for k in x[model.H].argmax(axis=1)),
-                tuple(model.pairs[int(k)] for k in pairs),
-                x[model.alpha],
-                float(x[value].sum()),
-            )
+    """For each filling the topology of the largest start, where the end knots of the grasp exist at all."""
+    fillings = [(0, 0)] if len(grasp.facets) == 3 else [(0, 0), (0, 1), (1, 0), (1, 1)]
+    for hubs in fillings:
+        model = NestedCages(geometry, [grasp], [knots[0], knots[-1]], hubs=hubs)
+        if not model.feasible:
+            return
+        model.maximise_attraction()
+        x = model.milp.solve("highs", time_limit=seconds).x
+        if x is not None:
+            yield topology_of(model, x)
+
+
+def topology_of(model: NestedCages, x: Array) -> Topology:
+    """The discrete choices of a solution."""
+    alpha = x[model.alpha]
+    return Topology(
+        grasp=model.grasps[int(x[model.z].argmax())],
+        hubs=model.hubs,
+        meetings=tuple(model.keys[int(k)] for k in x[model.H].argmax(axis=1)),
+        pairs=tuple(model.pairs[int(k)] for k in x[model.W].sum(axis=1).argmax(axis=1)),
+        alpha=alpha,
+        value=float(MIN_WEIGHT * alpha.min() + SUM_WEIGHT * alpha.sum()),
+    )
 
 
 def path_of(

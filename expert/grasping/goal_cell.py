@@ -44,6 +44,11 @@ def cells(table: Facets, count: int, margin: float) -> list[GoalCell]:
     found = []
     for chosen in tuples(table, count):
         reachable = _moments(table, chosen, margin)
+        if count == 3:
+            cell = GoalCell(table, chosen, 0, 0, margin)
+            if cell.E[0] > 0 and reachable[0, 0] < 0 < reachable[0, 1]:
+                found.append(cell)
+            continue
         for up, down in ((0, 1), (1, 0)):
             if reachable[up, 0] < -LEAST_MOMENT and reachable[down, 1] > LEAST_MOMENT:
                 found.append(GoalCell(table, chosen, up, down, margin))
@@ -136,11 +141,13 @@ def _area_and_edges(cell: GoalCell, p: Array) -> tuple[float, Array]:
     middles = (polygon + following) / 2
     on = np.abs(middles @ A.T - b).argmin(axis=1)
     lengths = np.bincount(on, np.linalg.norm(following - polygon, axis=1), cell.count)
-    return abs(signed_area(polygon)), lengths
+    return abs(signed_area(polygon)), np.asarray(lengths, dtype=float)
 
 
 def firmest_end(cell: GoalCell, reach: float) -> float | None:
     """Largest moment that both rays can have at the last knot; None where it does not exist."""
+    if cell.concurrent:
+        return None if some_knot(cell, cell.end(reach)) is None else 0.0
     count, moments = 2 * cell.count, cell.moments().V.reshape(2, -1)
     more = np.column_stack([moments, -np.ones(2)])
     answer = solve_rows(cell.end(reach), 1, np.append(np.zeros(count), -1.0), more, np.zeros(2))

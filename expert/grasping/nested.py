@@ -26,6 +26,7 @@ from expert.geometry.pose import Array
 from expert.grasping.cell import LEAST_MOMENT
 from expert.grasping.facets import Facets, rays
 from expert.grasping.goal_cell import DIRECTIONS, MIN_WEIGHT, REACH, SUM_WEIGHT
+from expert.grasping.rows import Rows
 from expert.grasping.smooth import SPEED
 from expert.mip.linear import LinearModel, Term
 from expert.types import IntArray
@@ -64,11 +65,15 @@ class FacetGeometry(SweptGeometry):
 
 @dataclass(frozen=True)
 class Grasp:
-    """Facets of the fingers in the order of the loop, and the rays whose moments hold the object from above and below."""
+    """Facets of the fingers in the order of the loop, and the rays whose moments hold the object from above and below.
+
+    jaws: what grippers ask of the fingers at every knot.
+    """
 
     facets: tuple[int, ...]
     up: int
     down: int
+    jaws: Rows | None = None
 
 
 @dataclass(frozen=True)
@@ -132,6 +137,7 @@ class NestedCages:
             self._limits()
             self._observability()
             self._region_of_attraction()
+            self._grippers()
 
     def _final_grasp(self) -> None:
         """T in L_O (5-CT14): one grasp; the facet that a finger ends on decides its region and its pieces."""
@@ -251,10 +257,19 @@ class NestedCages:
         for z, grasp in zip(self.z, self.grasps, strict=True):
             index = list(grasp.facets)
             weights = rays(table.normals[index])
+            if grasp.up == grasp.down:
+                self._concurrent(z, weights[grasp.up][:, None] * table.tangents[index])
+                continue
             for ray, sign in ((grasp.up, 1.0), (grasp.down, -1.0)):
                 moment = sign * weights[ray][:, None] * table.tangents[index]
                 most = float(np.abs(moment).sum() * REACH)
                 m.at_most([(moment.ravel(), last.ravel()), (most + LEAST_MOMENT, np.array([z]))], most)
+
+    def _concurrent(self, z: np.int64, moment: Array) -> None:
+        """Three fingers hold by curvature where their normals meet: z = 1 => no moment."""
+        most = float(np.abs(moment).sum() * REACH)
+        for sign in (1.0, -1.0):
+            self.milp.at_most([(sign * moment.ravel(), self.p[-1].ravel()), (most, np.array([z]))], most)
 
     def _region_of_attraction(self) -> None:
         """5-CT16: q + alpha_h r_h is free while each finger keeps to its region, which joins it with q."""
@@ -273,13 +288,21 @@ class NestedCages:
                     terms = [(a, self.s[0][:, t]), (-(a @ r), share[k, :, t]), (-b, self.T[:, t])]
                     m.at_most(terms, np.zeros(self.count))
 
-    def maximise_attraction(self) -> IntArray:
-        """Set the objective of 5-CT16's region: returns variables whose sum it is."""
+    def _grippers(self) -> None:
+        """Kinematics of parallel jaws (Thesis 5.2.5), with the one grasp that they were stated for."""
+        for jaws in (grasp.jaws for grasp in self.grasps if grasp.jaws is not None):
+            for p in self.p:
+                fingers = np.broadcast_to(p.ravel(), (len(jaws.V), p.size))
+                V, high, low = jaws.V.reshape(-1, p.size), np.isfinite(jaws.high), np.isfinite(jaws.low)
+                self.milp.at_most([(V[high], fingers[high])], jaws.high[high])
+                self.milp.at_most([(-V[low], fingers[low])], -jaws.low[low])
+
+    def maximise_attraction(self) -> None:
+        """Add the objective of 5-CT16's region."""
         m = self.milp
         least = m.add((1,), 0.0, REACH)
         m.at_most([(1.0, np.repeat(least, len(self.alpha))), (-1.0, self.alpha)], np.zeros(len(self.alpha)))
         m.minimise([(-SUM_WEIGHT, self.alpha), (-MIN_WEIGHT, least)])
-        return least
 
     def minimise_acceleration(self, weight: float = 1.0) -> None:
         """Add the cost of MIQP1: squared second differences of all fingers, and a little of their length."""

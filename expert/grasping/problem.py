@@ -22,6 +22,7 @@ class GraspProblem:
 
     half_ranges (K,) [rad], strictly decreasing: knot k keeps the object within +-half_ranges[k] of the goal orientation.
     cost: `attraction` makes the set of starts large, `acceleration` the finger paths smooth.
+    parallel: all grippers open along the world's x axis.
     margin: clearance that each condition keeps, relative to the object's diameter.
     Raises InvalidProblem.
     """
@@ -32,6 +33,7 @@ class GraspProblem:
     half_ranges: Array = field(default_factory=lambda: np.radians([15, 11.25, 7.5, 3.75, 0.5]))
     cost: GraspCost = "attraction"
     grippers: tuple[Gripper, ...] = ()
+    parallel: bool = False
     margin: float = 0.001
 
     def __post_init__(self) -> None:
