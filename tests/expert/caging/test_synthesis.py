@@ -82,20 +82,6 @@ def test_given_fingers_are_refused() -> None:
 
 
 @pytest.mark.slow
-def test_grippers_keep_their_openings() -> None:
-    grippers = (Gripper(fingers=(0, 1), opening=(0.0, 0.11)), Gripper(fingers=(2, 3), opening=(0.0, 0.11)))
-    task = problem(
-        named_shape("M"), 4, grippers=grippers, parallel=True, rotation=(tuple(np.radians([15, 15])),)
-    )
-    answer = solve(task, time_limit=120)
-    assert answer.found
-    for a, b in ((0, 1), (2, 3)):
-        step = answer.fingers[b] - answer.fingers[a]
-        assert step[1] == pytest.approx(0, abs=1e-6)
-        assert -1e-6 <= step[0] <= 0.11 + 1e-6
-
-
-@pytest.mark.slow
 def test_costs_order_two_finger_cages() -> None:
     spans = {}
     for cost in ("min_separation", "max_opening"):
