@@ -42,10 +42,10 @@ def read(data: dict[str, Any]) -> tuple[CageProblem | Arrangement, dict[str, Any
     problem = CageProblem(
         **common,
         count=fingers.integer("count"),
-        fewest=_flag(fingers, "fewest"),
+        fewest=read_flag(fingers, "fewest"),
         fixed=fixed,
         grippers=read_grippers(fingers),
-        parallel=_flag(fingers, "parallel"),
+        parallel=read_flag(fingers, "parallel"),
         direction=float(np.radians(fingers.number("direction"))) if "direction" in fingers else None,
         cost=file.choice("cost", COSTS, "none"),  # type: ignore[arg-type]
         margin=options.number("margin", 0.002),
@@ -109,7 +109,8 @@ def read_grippers(fingers: Section) -> tuple[Gripper, ...]:
     return tuple(grippers)
 
 
-def _flag(section: Section, key: str) -> bool:
+def read_flag(section: Section, key: str) -> bool:
+    """An optional true or false; missing means false.  Raises InvalidProblem."""
     value = section.data.get(key, False)
     if not isinstance(value, bool):
         raise InvalidProblem(section.path(key), expected="true or false", got=shorten(value))

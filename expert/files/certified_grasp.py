@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from expert.errors import InvalidProblem
-from expert.files.cage import read_grippers, require_size
+from expert.files.cage import read_flag, read_grippers, require_size
 from expert.files.fields import Section, checked_array, shorten
 from expert.geometry.polygon import signed_area
 from expert.geometry.pose import Array
@@ -32,13 +32,14 @@ def read(data: dict[str, Any]) -> tuple[GraspProblem, dict[str, Any]]:
     file.text("description", "")
     vertices = file.section("object", ("vertices",)).array("vertices", (None, 2))
     require_size("object.vertices", vertices)
-    fingers = file.section("fingers", ("count", "grippers"), optional=True)
+    fingers = file.section("fingers", ("count", "grippers", "parallel"), optional=True)
     options = file.section("options", ("half_ranges", "margin", "time_limit", "method"), optional=True)
     problem = GraspProblem(
         shape=Shape(vertices=vertices),
         pose=file.array("pose", (3,)) if "pose" in file else np.zeros(3),
         count=fingers.integer("count", 4),
         grippers=read_grippers(fingers),
+        parallel=read_flag(fingers, "parallel"),
         half_ranges=np.radians(_read_half_ranges(options)),
         cost=file.choice("cost", COSTS, "attraction"),  # type: ignore[arg-type]
         margin=options.number("margin", 0.001),

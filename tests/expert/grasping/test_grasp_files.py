@@ -29,7 +29,7 @@ def grasp_file() -> dict[str, Any]:
         "description": "a square",
         "object": {"vertices": copy.deepcopy(SQUARE)},
         "pose": [0.01, 0.02, 0.3],
-        "fingers": {"count": 4, "grippers": [{"fingers": [0, 1], "opening": [0.0, 0.2]}]},
+        "fingers": {"count": 4, "grippers": [{"fingers": [0, 1], "opening": [0.0, 0.2]}], "parallel": True},
         "cost": "acceleration",
         "options": {"half_ranges": [20, 10, 1], "margin": 0.002, "time_limit": 10, "method": "miqp1"},
     }
@@ -80,6 +80,7 @@ def test_a_file_means_what_it_says() -> None:
     np.testing.assert_allclose(np.degrees(task.half_ranges), [20, 10, 1])
     assert (task.count, task.cost, task.margin) == (4, "acceleration", 0.002)
     assert task.grippers[0].opening == (0.0, 0.2)
+    assert task.parallel
     assert problem.options == {"time_limit": 10.0, "method": "miqp1"}
 
 
@@ -104,6 +105,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "no margin": (changed(("options", "margin"), 0), "options.margin"),
     "method": (changed(("options", "method"), "magic"), "options.method: .* goal_cell or"),
     "cost": (changed(("cost",), "beauty"), "cost: .* attraction or acceleration"),
+    "parallel": (changed(("fingers", "parallel"), 1), "fingers.parallel: .* true or false"),
     "nan": (changed(("pose", 2), math.nan), r"pose\[2\]: .* nan"),
     "crossing": (changed(("object", "vertices"), [SQUARE[k] for k in (0, 2, 1, 3)]), "object.vertices: .* cross"),
     "a point": (changed(("object", "vertices"), [[1, 1]] * 3), "object.vertices: .* larger"),
