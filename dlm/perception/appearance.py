@@ -12,7 +12,7 @@ from expert.geometry.pose import Array
 
 LEAST_NOISE = 0.5
 """Standard deviation that is assumed of a pixel at least [grey levels]: it is rounded."""
-MODEL_ERROR = 0.01
+MODEL_ERROR = 0.004
 """Standard deviation of what no exact coverage explains, the renderer's own errors among it [share of a pixel]."""
 FOREIGN = 25.0
 """A colour this far from every mixture of object and background is something else [grey levels]."""
@@ -54,7 +54,7 @@ def separate(video: Frames, camera: Camera, floor: bool, blur: float) -> Appeara
         ground = ndimage.gaussian_filter1d(ground, blur, axis=0, mode="nearest")
     light, wall, background, noise = _background(images, ground)
     plain = images / light[..., None]
-    line = _object_colour(plain, background, noise) - wall
+    line = _object_colour(plain, background, noise, blur) - wall
     length = float(line @ line)
     share = ((plain - background) * line).sum(axis=-1) / length
     off = np.linalg.norm(plain - background - share[..., None] * line, axis=-1) * light
@@ -121,15 +121,17 @@ def _smooth_basis(height: int, width: int) -> Array:
     return np.stack([x, y, x * x, x * y, y * y], axis=-1)
 
 
-def _object_colour(plain: Array, background: Array, noise: float) -> Array:
-    """The colour that most of what differs from the background has; where something moves, of what moves."""
+def _object_colour(plain: Array, background: Array, noise: float, blur: float) -> Array:
+    """The commonest colour well inside what differs from the background; where something moves, inside what moves."""
     difference = np.linalg.norm(plain - background, axis=-1)
     different = difference > max(5 * noise, FAINTEST)
-    inner = ndimage.binary_erosion(different, CROSS)
     moves = np.linalg.norm(np.ptp(plain, axis=0), axis=-1) > max(8 * noise, 2 * FAINTEST)
-    for chosen in (inner & moves, inner, different):
-        if chosen.sum() >= FEWEST:
-            colours = plain[chosen][:: max(1, int(chosen.sum()) // 400)]
+    if (different & moves).any():
+        different = _pieces_with(moves, different)
+    for depth in range(1 + int(np.ceil(2 * blur)), -1, -1):
+        inner = ndimage.binary_erosion(different, CROSS, iterations=depth) if depth else different
+        if inner.sum() >= FEWEST:
+            colours = plain[inner][:: max(1, int(inner.sum()) // 400)]
             distances = np.linalg.norm(colours[:, None] - colours, axis=-1)
             alike = distances < max(4 * noise, FAINTEST)
             return np.median(colours[alike[alike.sum(axis=1).argmax()]], axis=0)
@@ -139,3 +141,12 @@ def _object_colour(plain: Array, background: Array, noise: float) -> Array:
         got="background only",
         remedy="show the object in every frame, in another colour than the background",
     )
+
+
+def _pieces_with(mark: NDArrayBool, masks: NDArrayBool) -> NDArrayBool:
+    """The connected pieces of each mask (T, h, w) that contain a marked pixel (h, w)."""
+    kept = np.zeros_like(masks)
+    for t, mask in enumerate(masks):
+        pieces, _ = ndimage.label(mask)
+        kept[t] = mask & np.isin(pieces, np.unique(pieces[mask & mark]))
+    return kept

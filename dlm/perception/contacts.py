@@ -1,14 +1,16 @@
 """Contact with the floor: vertices that the data cannot tell from touching it do touch it, and stay where they seem to."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dlm.perception.fit import Observation, Quadratic, Scene, quadratic
-from dlm.perception.prune import boundary_variance
+from dlm.perception.fit import LEAST_DAMPING, LONGEST_STEP, Observation, Quadratic, Scene, fit, quadratic
+from dlm.perception.prune import boundary_variance, without_tangles
 from expert.geometry.pose import Array
 
 ITERATIONS = 12
+EXACT = 1e-9
+"""What touches the floor is this close to it [pixels]."""
 SIGNIFICANT = 3.0
 """A gap or slip of so many standard deviations is one."""
 SYSTEMATIC_GAP, SYSTEMATIC_SLIP = 0.01, 0.02
@@ -29,15 +31,31 @@ class Contact:
         return SYSTEMATIC_SLIP if self.sticks else SYSTEMATIC_GAP
 
 
-def snap_contacts(scene: Scene, seen: Observation, floor: float, reach: float) -> tuple[Scene, list[Contact]]:
+def snap_contacts(scene: Scene, seen: Observation, floor: float, reach: float) -> Scene:
     """Fit again under the contacts that the data allows; nothing enters the floor Y = `floor` [pixels]."""
+    for _ in range(len(scene.vertices)):
+        snapped = _snapped(scene, seen, floor, reach)
+        simpler = without_tangles(_without_straight_corners(snapped.vertices, floor))
+        if len(simpler) == len(snapped.vertices):
+            return snapped
+        scene, _ = fit(replace(snapped, vertices=simpler), seen)
+    return snapped
+
+
+def _without_straight_corners(vertices: Array, floor: float) -> Array:
+    """Without what lies on the floor between two others."""
+    down = np.abs(vertices[:, 1] - floor) < EXACT
+    return vertices[~(down & np.roll(down, 1) & np.roll(down, -1))]
+
+
+def _snapped(scene: Scene, seen: Observation, floor: float, reach: float) -> Scene:
     contacts: list[Contact] = []
     for candidates in (_touching, _sticking):
         value = quadratic(scene, seen)
         _, variance = boundary_variance(scene, seen)
         contacts = contacts + candidates(scene, contacts, _covariance(value, variance), floor, reach)
         scene, contacts = _settle(scene, seen, contacts, floor, variance)
-    return scene, contacts
+    return scene
 
 
 def _settle(
@@ -47,7 +65,7 @@ def _settle(
     for _ in range(4 * scene.motion.size):
         scene, free, deviation = _fit_under(scene, seen, contacts, floor, variance)
         heights = scene.placed()[..., 1] - floor
-        inside = [Contact(int(t), int(k)) for t, k in np.argwhere(heights < -1e-9)]
+        inside = [Contact(int(t), int(k)) for t, k in np.argwhere(heights < -EXACT)]
         if new := [c for c in inside if c not in contacts]:
             contacts = contacts + new
             continue
@@ -78,12 +96,12 @@ def _fit_under(
         values, slopes = _constraints(scene, contacts, floor)
         here = quadratic(scene, seen)
         size = len(here.gradient)
-        matrix = here.matrix + 1e-6 * np.diag(here.matrix).mean() * np.eye(size)
+        matrix = here.matrix + LEAST_DAMPING * np.diag(here.matrix).mean() * np.eye(size)
         inverse = np.linalg.inv(matrix)
         spread = np.linalg.pinv(slopes @ inverse @ slopes.T, rcond=1e-9, hermitian=True)
         pull = spread @ (values - slopes @ inverse @ here.gradient)
         step = -inverse @ (here.gradient + slopes.T @ pull)
-        scene = scene.moved(step)
+        scene = scene.moved(step * min(1.0, LONGEST_STEP / max(np.abs(step).max(), 1e-12)))
         if np.abs(step).max() < 1e-6:
             break
     stiffness = np.maximum(np.diag(spread), 1e-12)
@@ -106,7 +124,9 @@ def _constraints(scene: Scene, contacts: list[Contact], floor: float) -> tuple[A
 
 def _covariance(value: Quadratic, variance: float) -> Array:
     size = len(value.gradient)
-    return variance * np.linalg.inv(value.matrix + 1e-6 * np.diag(value.matrix).mean() * np.eye(size))
+    return variance * np.linalg.inv(
+        value.matrix + LEAST_DAMPING * np.diag(value.matrix).mean() * np.eye(size)
+    )
 
 
 def _touching(

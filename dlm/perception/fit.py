@@ -106,6 +106,13 @@ def crossed(scene: Scene, seen: Observation) -> tuple[Array, NDArrayBool]:
     return seen.weight * (share - seen.share) ** 2, edge
 
 
+def calibrated(scene: Scene, seen: Observation) -> Observation:
+    """The observation with the object's colour corrected so that the scene explains it best: blur may hide a pure one."""
+    share, _ = modelled(scene, seen)
+    scale = float((seen.weight * share * seen.share).sum() / (seen.weight * share * share).sum())
+    return replace(seen, share=seen.share / scale, weight=seen.weight * scale**2)
+
+
 def without_outliers(scene: Scene, seen: Observation) -> Observation:
     """The observation without the pixels that the scene is far from explaining, as where something hides the object."""
     share, _ = modelled(scene, seen)

@@ -5,7 +5,7 @@ import numpy as np
 from datasets.render import Camera, Frames
 from dlm.perception.appearance import Appearance, separate
 from dlm.perception.contacts import snap_contacts
-from dlm.perception.fit import Observation, Scene, fit, without_outliers
+from dlm.perception.fit import Observation, Scene, calibrated, fit, without_outliers
 from dlm.perception.prune import boundary_variance, prune
 from dlm.perception.segment import Windows, segment
 from dlm.perception.start import clearest_frames, first_scene
@@ -16,6 +16,8 @@ from expert.geometry.pose import Array, to_body
 
 MARGIN = 4
 """Pixels around the object that are looked at; more where the image is blurred."""
+BLURRED_PASSES = 4
+"""Fits with the object's colour corrected in between."""
 STARTS = 3
 POOR = 9.0
 """Mean square of the errors over that of the noise beyond which another start is tried."""
@@ -36,7 +38,7 @@ def perceive(
     scene, seen = _best_start(seen, settings)
     scene, _ = prune(scene, seen)
     if settings.floor:
-        scene, _ = snap_contacts(scene, seen, camera.below / camera.scale, settings.snap)
+        scene = snap_contacts(scene, seen, camera.below / camera.scale, settings.snap)
     return _answer(scene, seen, camera, look)
 
 
@@ -46,7 +48,9 @@ def _best_start(seen: Observation, settings: PerceptionSettings) -> tuple[Scene,
     for reference in clearest_frames(seen)[:STARTS]:
         scene = first_scene(seen, int(reference), settings.most_vertices)
         trusted = without_outliers(scene, seen)
-        scene, _ = fit(scene, trusted)
+        for _ in range(BLURRED_PASSES if settings.blur > 0 else 1):
+            trusted = calibrated(scene, trusted)
+            scene, _ = fit(scene, trusted)
         _, error = boundary_variance(scene, seen)
         if error < least:
             best, least = (scene, trusted), error

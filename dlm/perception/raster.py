@@ -85,7 +85,9 @@ def is_simple(vertices: Array) -> bool:
     for i in range(count):
         a, b, c = vertices[i], vertices[(i + 1) % count], vertices[(i + 2) % count]
         back, along = b - a, c - b
-        fold = np.arctan2(abs(back[0] * along[1] - back[1] * along[0]), -(back[0] * along[0] + back[1] * along[1]))
+        fold = np.arctan2(
+            abs(back[0] * along[1] - back[1] * along[0]), -(back[0] * along[0] + back[1] * along[1])
+        )
         if fold < SHARPEST:
             return False
         for j in range(i + 2, count if i > 0 else count - 1):
