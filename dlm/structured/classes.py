@@ -1,7 +1,7 @@
 """Contact classes: which fingers touch when (a schedule) and which facet each of them touches.
 
 Contact is discontinuous: a network should choose among classes rather than regress coordinates.  A finger keeps to one facet
-in a class; plans in which one changes facets belong to no class (about one label in 500).
+in a class; plans in which one changes facets belong to no class (none of 10,000 labels).
 """
 
 from collections.abc import Iterable, Sequence
@@ -19,10 +19,11 @@ MEASURED = (
     "xxxxx xxxxx",
     "..xxx xxxxx",
     ".xxxx xx...",
-    "..... xxxxx",
-    ".xxxx xxxxx",
-    "xx... xxxxx",
     "...xx xxxxx",
+    ".xxxx xxxxx",
+    "..... xxxxx",
+    "xx... xxxxx",
+    "...xx xxxx.",
 )
 """Schedules of five steps and two fingers by falling share of the expert's labels; docs/structured.md has the shares."""
 

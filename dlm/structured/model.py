@@ -16,14 +16,14 @@ from dlm.structured.planning import Planning
 from expert.errors import InvalidProblem, SolverFailed
 from expert.types import ContactTask, Plan
 
-Status = Literal["planned", "poor_fit", "no_plan"]
+Status = Literal["planned", "risky", "poor_fit", "no_plan"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Planned:
     """Answer to a video.
 
-    status: planned; poor_fit (there is a plan, but the video is not explained by what was perceived); no_plan (none was
+    status: planned; risky (the best plan fails when it is tried out on what was perceived); poor_fit (there is a plan, but the video is not explained by what was perceived); no_plan (none was
     found, which does not prove that there is none).  reason: in words.  task: what was planned for, None where the
     geometry makes no task.  checked: contact classes looked at.
     """
@@ -109,31 +109,38 @@ class StructuredModel:
 
     def plan(self, perceived: Perceived) -> Planned:
         """Plan for perceived geometry.  Raises InvalidProblem for another number of frames than planned for."""
-        checked, task = 0, None
-        for planning in self.planning.relaxed():
-            try:
-                task = planning.of(perceived)
-                answer = self.planner(task)
-            except InvalidProblem as error:
-                if error.field == "poses":
-                    raise
-                return Planned(perceived=perceived, status="no_plan", reason=str(error), checked=checked)
-            except SolverFailed as error:
-                return Planned(perceived=perceived, status="no_plan", reason=str(error), checked=checked)
-            checked += answer.checked
-            if answer.plan is not None:
-                return _planned(perceived, answer, checked)
-        reason = f"no plan among {checked} checked contact classes"
-        return Planned(perceived=perceived, status="no_plan", reason=reason, task=task, checked=checked)
+        checked, best = 0, None
+        try:
+            for planning in self.planning.variants():
+                answer = self.planner(planning.of(perceived))
+                checked += answer.checked
+                if answer.plan is not None and (best is None or answer.risk < best.risk):
+                    best = answer
+                if best is not None and best.risk <= self.planner.acceptable:
+                    break
+        except InvalidProblem as error:
+            if error.field == "poses":
+                raise
+            return Planned(perceived=perceived, status="no_plan", reason=str(error), checked=checked)
+        except SolverFailed as error:
+            return Planned(perceived=perceived, status="no_plan", reason=str(error), checked=checked)
+        if best is None:
+            reason = f"no plan among {checked} checked contact classes"
+            return Planned(perceived=perceived, status="no_plan", reason=reason, checked=checked)
+        return self._answer(perceived, best, checked)
 
-
-def _planned(perceived: Perceived, answer: Answer, checked: int) -> Planned:
-    doubt = perceived.status != "ok"
-    return Planned(
-        perceived=perceived,
-        status="poor_fit" if doubt else "planned",
-        reason=perceived.reason if doubt else "",
-        plan=answer.plan,
-        task=answer.task,
-        checked=checked,
-    )
+    def _answer(self, perceived: Perceived, answer: Answer, checked: int) -> Planned:
+        status: Status = "planned"
+        reason = ""
+        if answer.risk > self.planner.acceptable:
+            status, reason = "risky", f"in simulation its loss is up to {answer.risk:.2g} cm^2"
+        if perceived.status != "ok":
+            status, reason = "poor_fit", perceived.reason
+        return Planned(
+            perceived=perceived,
+            status=status,
+            reason=reason,
+            plan=answer.plan,
+            task=answer.task,
+            checked=checked,
+        )

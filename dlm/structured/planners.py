@@ -4,23 +4,33 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
+import numpy as np
+
 from datasets.label import Label, Labelling, label
 from dlm.structured.check import NODES, check
 from dlm.structured.classes import Schedules
+from dlm.structured.trial import Trial
 from expert.contact.model import model_of
 from expert.types import ContactTask, IntArray, Plan
 
 
 class Answer(NamedTuple):
-    """plan: None where none was found, which proves nothing.  task: the one it solves.  checked: classes looked at."""
+    """plan: None where none was found, which proves nothing.  task: the one it solves.  checked: classes looked at.
+
+    risk: loss in the worst trial [cm^2]; 0 without trials.
+    """
 
     plan: Plan | None
     task: ContactTask
     checked: int
+    risk: float = 0.0
 
 
 class Planner(Protocol):
-    """Answers a contact task."""
+    """Answers a contact task; answers of a risk up to `acceptable` need no alternative."""
+
+    @property
+    def acceptable(self) -> float: ...
 
     def __call__(self, task: ContactTask) -> Answer: ...
 
@@ -33,22 +43,38 @@ Proposer = Callable[[ContactTask], list[IntArray]]
 class ClassPlanner:
     """Checks batches of proposed classes until one of them has a plan; the best of that batch is taken.
 
-    propose: None for no learning, every class.  node_limit: see `check`.
+    propose: None for no learning, every class.  trial: None takes the cheapest plan as it is; otherwise the cheapest that
+    survives its trial, or the one of least risk among a few.  node_limit: see `check`.
     """
 
     schedules: Schedules = field(default_factory=Schedules)
     propose: Proposer | None = None
+    trial: Trial | None = None
     node_limit: int = NODES
 
     def __call__(self, task: ContactTask) -> Answer:
         model, checked = model_of(task), 0
-        propose = self.propose or self.every_class
-        for classes in propose(task):
+        tries = 1 if self.trial is None else self.trial.candidates
+        safest = Answer(None, task, 0, np.inf)
+        for classes in (self.propose or self.every_class)(task):
             checked += len(classes)
-            found = check(task, self.schedules.modes(classes), node_limit=self.node_limit, model=model)
-            if found.plan is not None:
-                return Answer(found.plan, task, checked)
-        return Answer(None, task, checked)
+            modes = self.schedules.modes(classes)
+            while tries > 0 and len(modes):
+                plan = check(task, modes, node_limit=self.node_limit, model=model).plan
+                if plan is None:
+                    break
+                risk = 0.0 if self.trial is None else self.trial.loss(task, plan)
+                if safest.plan is None or risk < safest.risk:
+                    safest = Answer(plan, task, checked, risk)
+                if self.trial is None or risk <= self.trial.good:
+                    return safest
+                modes, tries = modes[(modes != plan.modes).any(axis=(1, 2))], tries - 1
+        return safest._replace(checked=checked)
+
+    @property
+    def acceptable(self) -> float:
+        """What trials call good; without trials, every plan is."""
+        return np.inf if self.trial is None else self.trial.good
 
     def every_class(self, task: ContactTask) -> list[IntArray]:
         """No learning: all classes, in one batch."""
@@ -60,6 +86,7 @@ class ExpertPlanner:
     """The expert, over all contact sequences, with the checker's consent."""
 
     labelling: Labelling = field(default_factory=lambda: Labelling(node_limit=500))
+    acceptable: float = np.inf
 
     def __call__(self, task: ContactTask) -> Answer:
         answer = label(task, self.labelling)

@@ -14,6 +14,8 @@ FACET_MARGIN = 0.2
 """Share of a facet kept free at either end: perceived corners are off by a part of a pixel, and may be superfluous."""
 
 LESS_MARGIN = (0.1, 0.05)
+SAFER = ((0.7, 0.0), (1.0, 0.12), (0.7, 0.12))
+"""Shares of the friction planned with, and least pushes over m g."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,10 +44,14 @@ class Planning:
         """The task that is seen."""
         return self.task(perceived.vertices, perceived.poses)
 
-    def relaxed(self) -> Iterator["Planning"]:
-        """This planning, then with margins given up one after the other: not every motion has a plan that keeps them."""
+    def variants(self) -> Iterator["Planning"]:
+        """This planning; then with margins given up one after the other, for motions without a plan that keeps them; then
+        with firmer and steeper pushes, for plans that fail when they are tried out."""
         own = self.tasks
         margins = [m for m in (own.facet_margin, *LESS_MARGIN) if m <= own.facet_margin]
         for facet_margin in dict.fromkeys(margins):
             for least_push in dict.fromkeys((own.least_push, 0.0)):
                 yield replace(self, tasks=replace(own, facet_margin=facet_margin, least_push=least_push))
+        for cone, push in SAFER:
+            firmer = max(own.least_push, push)
+            yield replace(self, tasks=replace(own, cone_fraction=cone * own.cone_fraction, least_push=firmer))

@@ -41,7 +41,7 @@ from expert.mechanics import external_contacts
 from expert.types import ContactTask
 
 KINDS = {"4-6": Shapes(), "12": Shapes(facets=(12, 12))}
-SEED = 101
+SEED = 202
 BARS = {
     ("4-6", "clean"): (0.005, 0.97),
     ("12", "clean"): (0.02, 0.95),
