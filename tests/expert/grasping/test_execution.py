@@ -1,0 +1,92 @@
+"""Certificates and executions against each other: certified starts arrive, predicted jams happen, nothing else jams."""
+
+import numpy as np
+import pytest
+
+from dlm.simulator.grasp import replay_grasp, replay_grasp_in_mujoco
+from expert.caging.problem import Shape
+from expert.grasping.problem import GraspProblem, GraspSolution
+from expert.grasping.shapes import grasp_shape, irregular_polygon
+from expert.grasping.sweeping import sweep
+from expert.grasping.synthesis import solve
+from expert.verify.dead_ends import dead_end_events
+from expert.verify.finger_path import FingerPath
+from expert.verify.start_set import StartSet
+from tests.expert.grasping.experiments import closing_path, hard_starts, miss
+
+Certified = tuple[GraspProblem, GraspSolution, StartSet]
+TOLERANCE, ANGLE = 1e-5, np.radians(0.01)
+
+
+OBJECTS = {"bracket": grasp_shape("bracket"), "random": irregular_polygon(np.random.default_rng(3), 4)}
+
+
+@pytest.fixture(scope="module", params=OBJECTS)
+def certified(request: pytest.FixtureRequest) -> Certified:
+    pose = np.array([0.1, -0.05, 0.4])
+    problem = GraspProblem(shape=Shape(vertices=OBJECTS[request.param]), pose=pose)
+    answer = solve(problem)
+    assert answer.found, answer.reason
+    return problem, answer, StartSet(FingerPath(problem.shape, problem.pose, answer.path))
+
+
+def test_every_start_in_the_certified_set_ends_at_the_goal(certified: Certified) -> None:
+    problem, answer, starts = certified
+    rng = np.random.default_rng(1)
+    path = FingerPath(problem.shape, problem.pose, answer.path)
+    chosen = np.concatenate([starts.starts(rng, 100), hard_starts(path, starts, rng)])
+    assert len(chosen) > 110
+    run = sweep(problem.shape, answer.path, chosen, goal=problem.pose)
+    distance, angle = run.misses(problem.pose)
+    assert np.isnan(run.stalled).all()
+    assert distance.max() <= TOLERANCE * problem.shape.size
+    assert angle.max() <= ANGLE
+
+
+def test_success_does_not_depend_on_the_support(certified: Certified) -> None:
+    problem, answer, starts = certified
+    chosen = starts.starts(np.random.default_rng(2), 40)
+    rng = np.random.default_rng(3)
+    middles = []
+    for _ in range(4):
+        root = rng.normal(size=(3, 3))
+        metric = root @ root.T + 0.05 * np.eye(3)
+        run = sweep(problem.shape, answer.path, chosen, goal=problem.pose, metric=metric)
+        distance, angle = run.misses(problem.pose)
+        assert distance.max() <= TOLERANCE * problem.shape.size
+        assert angle.max() <= ANGLE
+        middles.append(run.poses[:, len(run.s) // 2])
+    assert np.abs(middles[0] - middles[1]).max() > 1e-4  # on the way it does
+
+
+def test_the_contact_simulator_arrives_too(certified: Certified) -> None:
+    """With masses, springs and Coulomb friction at the support, fingers without friction: within 0.1 % of size."""
+    problem, answer, starts = certified
+    chosen = starts.starts(np.random.default_rng(4), 8)
+    ends = replay_grasp(problem, answer.path, chosen)[:, -1] - problem.pose
+    assert np.linalg.norm(ends[:, :2], axis=1).max() <= 1e-3 * problem.shape.size
+    assert np.abs(ends[:, 2]).max() <= np.radians(0.1)
+
+
+def test_mujoco_arrives_too(certified: Certified) -> None:
+    pytest.importorskip("mujoco")
+    problem, answer, starts = certified
+    start = starts.starts(np.random.default_rng(5), 1)[0]
+    end = replay_grasp_in_mujoco(problem, answer.path, start)[-1] - problem.pose
+    assert np.linalg.norm(end[:2]) <= 2e-3 * problem.shape.size
+    assert abs(end[2]) <= np.radians(0.3)
+
+
+def test_every_stall_of_paths_that_nobody_certified_is_a_predicted_dead_end() -> None:
+    stalls = 0
+    for seed in range(8):
+        shape, path, starts = closing_path(seed)
+        run = sweep(shape, path, starts)
+        stalled = np.flatnonzero(np.isfinite(run.stalled))
+        fingers = FingerPath(shape, np.zeros(3), path)
+        events = dead_end_events(fingers)
+        for i in stalled:
+            configuration = fingers.configurations(run.ends[i])[0]
+            assert min(miss(event, run.stalled[i], configuration) for event in events) <= 1e-3, (seed, i)
+            stalls += 1
+    assert stalls >= 50
