@@ -268,16 +268,18 @@ def test_bad_input_gets_one_line_and_code_2_and_destroys_nothing(
 
 def groups() -> list[tuple[str, str]]:
     """Every option of every configuration group, with a command that takes it."""
-    owner = {"dataset": "generate"}
+    owner = {"dataset": ("generate", "dataset"), "shapes": ("generate", "shapes@dataset.shapes")}
     return [
-        (owner.get(path.parent.name, "train"), f"{path.parent.name}={path.stem}")
+        (command, f"{option}={path.stem}")
         for path in sorted((ROOT / "configs").glob("*/*.yaml"))
         if path.stem != "common"
+        for command, option in [owner.get(path.parent.name, ("train", path.parent.name))]
     ]
 
 
 @pytest.mark.parametrize(
-    ("command", "choice"), [*groups(), ("train", ""), ("evaluate", ""), ("generate", ""), ("evaluate", "data=smoke")]
+    ("command", "choice"), [*groups(), ("train", ""), ("evaluate", ""), ("generate", ""), ("evaluate", "data=smoke"),
+     ("evaluate", "experiment=table_4_1"), ("infer", "video=clip.mp4")]
 )  # fmt: skip
 def test_every_configuration_composes_without_gaps(
     command: str, choice: str, composed: Callable[..., DictConfig]
@@ -286,4 +288,4 @@ def test_every_configuration_composes_without_gaps(
 
     configuration = composed(command, *[choice] if choice else [])
     plain = OmegaConf.to_container(configuration, resolve=True, throw_on_missing=True)
-    assert "seed" in plain or "seeds" in plain
+    assert {"seed", "seeds", "video"} & set(plain)

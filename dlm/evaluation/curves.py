@@ -27,7 +27,7 @@ def curves_figure(histories: Histories, no_action: Mapping[str, float]) -> Figur
 
     no_action: object loss of doing nothing, by data set [cm^2].
     """
-    figure = Figure(figsize=(13, 4.4), layout="constrained")
+    figure = Figure(figsize=(13, 5), layout="constrained")
     for ax, (title, kind, stages, datasets) in zip(figure.subplots(1, 3), PANELS, strict=True):
         for stage in stages:
             for dataset in datasets:
@@ -36,7 +36,7 @@ def curves_figure(histories: Histories, no_action: Mapping[str, float]) -> Figur
             ax.axhline(no_action["test"], color="0.5", lw=1, label="no action, test")
         ax.set(title=title, xlabel="iteration", ylabel="cm²", yscale="log")
         ax.grid(alpha=0.25, which="both", lw=0.5)
-        ax.legend(fontsize=7, ncols=2)
+        ax.legend(fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False)
     return figure
 
 
