@@ -43,7 +43,7 @@ class Appearance:
     contrast: Array
 
 
-def separate(video: Frames, camera: Camera, floor: bool, blur: float) -> Appearance:
+def separate(video: Frames, camera: Camera, floor: bool, blur: float = 0.0) -> Appearance:
     """Unmix a video of one object.  Raises InvalidProblem where nothing stands out from the background.
 
     The object is above the floor, so that it hides the wall alone, even where a pixel or the blur mixes all three.

@@ -11,6 +11,8 @@ from expert.geometry.pose import Array
 
 SMALLEST = 12
 """Fewest pixels that make an object."""
+MARGIN = 4
+"""Pixels around the object that are looked at; more where the image is blurred."""
 RIVAL = 0.15
 """A second piece of this share of the object's area is another object."""
 
@@ -34,7 +36,7 @@ class Windows:
         )
 
 
-def segment(look: Appearance, margin: int) -> Windows:
+def segment(look: Appearance, margin: int = MARGIN) -> Windows:
     """The object's pixels.  Raises InvalidProblem for several objects, or one that is not wholly in view in every frame."""
     masks = np.stack([_one_object(look, t) for t in range(len(look.share))])
     areas = masks.sum(axis=(1, 2))

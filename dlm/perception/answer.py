@@ -1,0 +1,82 @@
+"""The fitted scene as the labels of a data set describe one, and whether it explains the video."""
+
+from typing import cast
+
+import numpy as np
+import shapely
+
+from datasets.render import Camera
+from dlm.perception.appearance import Appearance
+from dlm.perception.fit import Observation, Scene, modelled
+from dlm.perception.raster import is_simple
+from dlm.perception.types import Perceived, PerceptionSettings, Status
+from expert.geometry.polygon import mass_properties, signed_area
+from expert.geometry.pose import Array, to_body
+
+UNEXPLAINED = 4.0
+"""Rms difference that even a noiseless video may have [grey levels]."""
+MOST_HIDDEN = 0.4
+"""Share of the outline, over all frames, that may be hidden."""
+LOW = 0.1
+"""Vertices as low as the lowest, when the first one is chosen [pixels]."""
+
+
+def answer(
+    scene: Scene, seen: Observation, look: Appearance, camera: Camera, settings: PerceptionSettings
+) -> Perceived:
+    """In metres, about the centroid, the lowest vertex first."""
+    residual, hidden = explained(scene, seen, look)
+    status, reason = _verdict(scene, residual, hidden, look.noise, settings)
+    placed = scene.placed() if is_simple(scene.vertices) else _hull(scene)
+    outline = camera.to_world(placed * [1, -1] + [0, camera.size])
+    low = np.flatnonzero(outline[0, :, 1] < outline[0, :, 1].min() + LOW * camera.scale)
+    first = int(low[outline[0, low, 0].argmin()])
+    outline = np.roll(outline, -first, axis=1)
+    centres = np.array([mass_properties(corners).centroid for corners in outline])
+    poses = np.column_stack([centres, scene.motion[:, 2]])
+    return Perceived(
+        vertices=to_body(poses[0], outline[0]),
+        poses=poses,
+        residual=residual,
+        noise=look.noise,
+        status=status,
+        reason=reason,
+    )
+
+
+def explained(scene: Scene, seen: Observation, look: Appearance) -> tuple[float, float]:
+    """Rms error of the pixels that the outline crosses [grey levels], and the share of these that are hidden."""
+    share, gradient = modelled(scene, seen)
+    edge = np.abs(gradient).sum(axis=(-1, -2)) > 1e-3
+    visible = edge & (seen.weight > 0)
+    hidden = 1 - float(visible.sum()) / max(int(edge.sum()), 1)
+    squares = (share - seen.share)[visible] ** 2
+    return float(np.median(look.contrast) * np.sqrt(squares.mean())) if visible.any() else np.inf, hidden
+
+
+def _verdict(
+    scene: Scene, residual: float, hidden: float, noise: float, settings: PerceptionSettings
+) -> tuple[Status, str]:
+    allowed = settings.tolerance * noise + UNEXPLAINED
+    if not is_simple(scene.vertices):
+        return "poor_fit", "the outline crosses itself; its convex hull is given"
+    if residual > allowed:
+        return (
+            "poor_fit",
+            f"video and model differ by {residual:.1f} grey levels along the outline, more than {allowed:.1f}",
+        )
+    if hidden > MOST_HIDDEN:
+        return (
+            "poor_fit",
+            f"{100 * hidden:.0f} % of the outline is hidden, more than {100 * MOST_HIDDEN:.0f} %",
+        )
+    return "ok", ""
+
+
+def _hull(scene: Scene) -> Array:
+    """The scene with the convex hull of its vertices."""
+    hull = np.array(cast(shapely.Polygon, shapely.MultiPoint(scene.vertices).convex_hull).exterior.coords)[
+        :-1
+    ]
+    hull = hull if signed_area(hull) > 0 else hull[::-1]
+    return Scene(hull, scene.motion, scene.centre).placed()
