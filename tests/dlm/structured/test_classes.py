@@ -51,4 +51,4 @@ def test_words_that_are_no_schedules_are_refused(patterns: tuple[str, ...]) -> N
 
 
 def test_the_measured_vocabulary_names_each_schedule_once() -> None:
-    assert len(set(Schedules(MEASURED).patterns)) == len(MEASURED) == 7
+    assert len(set(Schedules(MEASURED).patterns)) == len(MEASURED) == 8
