@@ -5,7 +5,7 @@
 3. With these fixed the whole path is a convex program: least acceleration among those that keep the region of attraction.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import clarabel
@@ -16,9 +16,6 @@ from expert.geometry.pose import Array
 from expert.grasping.goal_cell import MIN_WEIGHT, SUM_WEIGHT
 from expert.grasping.nested import FacetGeometry, Grasp, Knot, NestedCages
 from expert.mip.backends import StandardForm
-
-KEPT = 0.98
-"""Share of the region of attraction that smoothing leaves."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +34,7 @@ def topologies(
     geometry: FacetGeometry, grasp: Grasp, knots: Sequence[Knot], seconds: float
 ) -> Iterator[Topology]:
     """For each filling the topology of the largest start, where the end knots of the grasp exist at all."""
-    fillings = [(0, 0)] if len(grasp.facets) == 3 else [(0, 0), (0, 1), (1, 0), (1, 1)]
-    for hubs in fillings:
+    for hubs in fillings(len(grasp.facets)):
         model = NestedCages(geometry, [grasp], [knots[0], knots[-1]], hubs=hubs)
         if not model.feasible:
             return
@@ -46,6 +42,11 @@ def topologies(
         x = model.milp.solve("highs", time_limit=seconds).x
         if x is not None:
             yield topology_of(model, x)
+
+
+def fillings(count: int) -> list[tuple[int, int]]:
+    """Ways to fill the loop below and above the goal: the diagonals of a square."""
+    return [(0, 0)] if count == 3 else [(0, 0), (0, 1), (1, 0), (1, 1)]
 
 
 def topology_of(model: NestedCages, x: Array) -> Topology:
@@ -62,17 +63,28 @@ def topology_of(model: NestedCages, x: Array) -> Topology:
 
 
 def path_of(
-    geometry: FacetGeometry, topology: Topology, knots: Sequence[Knot], share: float = KEPT
+    geometry: FacetGeometry, topology: Topology, knots: Sequence[Knot], finish: Callable[[NestedCages], None]
 ) -> Array | None:
-    """Smoothest path (K, N, 2) of a topology that keeps this share of its region of attraction; None where none was found."""
+    """Best path (K, N, 2) of a topology for the objective that `finish` adds; None where none was found."""
     model = NestedCages(geometry, [topology.grasp], knots, hubs=topology.hubs)
     if not model.feasible or any(key not in model.keys for key in topology.meetings):
         return None
     model.fix(topology.meetings, topology.pairs)
-    model.milp.at_most([(-1.0, model.alpha)], -share * topology.alpha)
-    model.minimise_acceleration()
+    finish(model)
     x = solve_convex(model.milp.form())
     return None if x is None else x[model.p]
+
+
+def smooth_path(
+    geometry: FacetGeometry, topology: Topology, knots: Sequence[Knot], share: float
+) -> Array | None:
+    """Smoothest path of a topology that keeps this share of its region of attraction."""
+
+    def finish(model: NestedCages) -> None:
+        model.milp.at_most([(-1.0, model.alpha)], -share * topology.alpha)
+        model.minimise_acceleration()
+
+    return path_of(geometry, topology, knots, finish)
 
 
 def solve_convex(form: StandardForm) -> Array | None:

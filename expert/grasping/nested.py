@@ -299,18 +299,36 @@ class NestedCages:
 
     def maximise_attraction(self) -> None:
         """Add the objective of 5-CT16's region."""
-        m = self.milp
-        least = m.add((1,), 0.0, REACH)
-        m.at_most([(1.0, np.repeat(least, len(self.alpha))), (-1.0, self.alpha)], np.zeros(len(self.alpha)))
-        m.minimise([(-SUM_WEIGHT, self.alpha), (-MIN_WEIGHT, least)])
+        self.milp.minimise([(-SUM_WEIGHT, self.alpha), (-MIN_WEIGHT, self.common_alpha())])
 
-    def minimise_acceleration(self, weight: float = 1.0) -> None:
+    def common_alpha(self) -> IntArray:
+        """The one alpha of MIQP2, (1,): no larger than any alpha_h."""
+        alpha = self.milp.add((1,), 0.0, REACH)
+        among = np.repeat(alpha, len(self.alpha))
+        self.milp.at_most([(1.0, among), (-1.0, self.alpha)], np.zeros(len(self.alpha)))
+        return alpha
+
+    def minimise_acceleration(self) -> None:
         """Add the cost of MIQP1: squared second differences of all fingers, and a little of their length."""
         m, p = self.milp, self.p
         bend = m.add(p[2:].shape, -4 * REACH, 4 * REACH)
         m.equal([(1.0, bend), (-1.0, p[2:]), (2.0, p[1:-1]), (-1.0, p[:-2])], np.zeros(bend.shape))
         zero = np.broadcast_to(m.add((1,), 0.0, 0.0), bend.shape)
-        m.minimise([], [(weight, bend, zero), (weight * SPEED, p[1:], p[:-1])])
+        m.minimise([], [(1.0, bend, zero), (SPEED, p[1:], p[:-1])])
+
+    def minimise_bends(self, weight: float) -> None:
+        """The same in the sum norm, for a linear solver: it has the same paths without any acceleration."""
+        m, p = self.milp, self.p
+        bend = m.add(p[2:].shape, 0.0, 4 * REACH)
+        for sign in (1.0, -1.0):
+            terms: list[Term] = [(sign, p[2:]), (-2 * sign, p[1:-1]), (sign, p[:-2]), (-1.0, bend)]
+            m.at_most(terms, np.zeros(bend.shape))
+        m.minimise([(weight, bend)])
+
+    def cut(self, x: Array) -> None:
+        """Never again this grasp with this topology."""
+        on = np.concatenate([v.ravel()[x[v.ravel()] > 0.5] for v in (self.z, self.H)])
+        self.milp.at_most([(1.0, on)], len(on) - 1.0)
 
     def fix(self, meetings: Sequence[tuple[int, int]], pairs: Sequence[tuple[int, int]]) -> None:
         """Fix how the loop passes through each finger and on to the next: what remains is convex."""

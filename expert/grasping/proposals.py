@@ -9,16 +9,27 @@ from functools import cached_property
 import numpy as np
 
 from expert.caging.frame import Frame
+from expert.errors import InvalidProblem
 from expert.geometry.polygon import signed_area
 from expert.geometry.pose import Array
 from expert.grasping.cell import GoalCell
-from expert.grasping.decomposed import path_of, topologies
+from expert.grasping.decomposed import smooth_path, topologies
 from expert.grasping.facets import Facets
-from expert.grasping.goal_cell import DIRECTIONS, Candidate, candidate, cells, hold, largest_start, region
+from expert.grasping.goal_cell import (
+    DIRECTIONS,
+    REACH,
+    Candidate,
+    candidate,
+    cells,
+    hold,
+    largest_start,
+    region,
+)
 from expert.grasping.gripper import Places, jaws, placements
 from expert.grasping.nested import FacetGeometry, Grasp, schedule
 from expert.grasping.problem import GraspProblem
 from expert.grasping.smooth import acceleration, smoothest
+from expert.grasping.thesis import Name, solutions
 
 ENLARGED = 10
 """So many goal cells, the best by 5-CT16, have the area of their start maximised."""
@@ -155,7 +166,37 @@ def decomposed(search: Search) -> Iterator[Proposal]:
         for (topology, places), share in itertools.product(found, SHARES):
             if search.left <= 0:
                 return
-            path = path_of(geometry, topology, knots, share)
+            path = smooth_path(geometry, topology, knots, share)
             if path is not None:
-                starts = share * topology.alpha[:, None] * DIRECTIONS
+                starts = _free_region(search, topology.grasp.facets, path[0])
                 yield Proposal(path, topology.grasp.facets, starts, "decomposed").labelled(places)
+
+
+def thesis(search: Search, name: Name) -> Iterator[Proposal]:
+    """MIQP1 or MIQP2, each answer cut off in turn."""
+    if search.problem.grippers:
+        what = "a problem without grippers"
+        remedy = "method: goal_cell or decomposed"
+        raise InvalidProblem("method", expected=what, got=f"{name} with grippers", remedy=remedy)
+    grasps = [Grasp(cell.chosen, cell.up, cell.down) for cell, _ in search.cells()]
+    if not grasps:
+        return
+    geometry = FacetGeometry(search.table.vertices, search.margin)
+    knots = schedule(search.problem.half_ranges, search.margin)
+    for topology, path in solutions(geometry, grasps, knots, name, MIP_SECONDS):
+        facets = topology.grasp.facets
+        yield Proposal(path, facets, _free_region(search, facets, path[0]), name)
+        if search.left <= 0:
+            return
+
+
+def _free_region(search: Search, facets: tuple[int, ...], p: Array) -> Array:
+    """Translations r_h alpha_h (H, 2), alpha_h as large as 5-CT16 allows for fingers p (N, 2) over their facets."""
+    alpha = np.full(len(DIRECTIONS), REACH)
+    for f, finger in zip(facets, p, strict=True):
+        region = search.table.beyond(f)
+        room, speed = region.b - region.A @ finger, -region.A @ DIRECTIONS.T
+        with np.errstate(divide="ignore"):
+            limits = np.where(speed > 1e-9, room[:, None] / np.maximum(speed, 1e-9), REACH)
+        alpha = np.minimum(alpha, limits.min(axis=0))
+    return np.maximum(alpha, 0.0)[:, None] * DIRECTIONS

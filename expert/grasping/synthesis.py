@@ -12,7 +12,7 @@ from typing import Literal
 from expert.errors import InvalidProblem
 from expert.geometry.pose import rotation
 from expert.grasping.problem import GraspProblem, GraspSolution
-from expert.grasping.proposals import Proposal, Search, decomposed, goal_cells
+from expert.grasping.proposals import Proposal, Search, decomposed, goal_cells, thesis
 from expert.grasping.smooth import acceleration
 from expert.verify.grasp import verify_grasp
 
@@ -79,4 +79,6 @@ def _cells_then_cages(search: Search) -> Iterator[Proposal]:
 METHODS: dict[str, Callable[[Search], Iterator[Proposal]]] = {
     "goal_cell": _cells_then_cages,
     "decomposed": decomposed,
+    "miqp1": lambda search: thesis(search, "miqp1"),
+    "miqp2": lambda search: thesis(search, "miqp2"),
 }

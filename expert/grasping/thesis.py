@@ -1,0 +1,65 @@
+"""MIQP1 and MIQP2 of Thesis 5.2.5 and 5.2.6 as mixed-integer programs over all knots and all final grasps.
+
+    minimise    sum |p''|^2  (- alpha, MIQP2)
+    subject to  caging at every knot            5-CT12, 13   loops, winding, filled limits
+                convergence                     5-CT14, 15   prescribed half-ranges, a final grasp on facets
+                observability                   5-CT17..19   as first-order form closure
+                region of attraction (MIQP2)    5-CT16
+
+All blocks live in `expert.grasping.nested`, where what had to be mended is named.  Discrete choices are made by a linear
+solver with accelerations in the sum norm, one program for each filling of the limits; with these choices fixed the path
+is the minimiser of the quadratic program as stated above.
+"""
+
+import heapq
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import Literal
+
+from expert.geometry.pose import Array
+from expert.grasping.decomposed import Topology, fillings, path_of, topology_of
+from expert.grasping.nested import FacetGeometry, Grasp, Knot, NestedCages
+
+BEND_WEIGHT = 0.1
+"""Weight of accelerations in the sum norm against alpha (both in enclosing radii)."""
+MOST_CUTS = 6
+"""Solutions that each program gives before it is left."""
+Name = Literal["miqp1", "miqp2"]
+
+
+def finish(model: NestedCages, name: Name) -> None:
+    """The objective, as a quadratic program."""
+    model.minimise_acceleration()
+    if name == "miqp2":
+        model.milp.minimise([(-1.0, model.common_alpha())])
+
+
+def solutions(
+    geometry: FacetGeometry, grasps: Sequence[Grasp], knots: Sequence[Knot], name: Name, seconds: float
+) -> Iterator[tuple[Topology, Array]]:
+    """Topologies and paths (K, N, 2), the best first; each is cut off when the next one is asked for."""
+    order = itertools.count()
+    queue: list[tuple[float, int, int, NestedCages, Array]] = []
+
+    def push(model: NestedCages, cuts: int) -> None:
+        answer = model.milp.solve("highs", gap=0.01, time_limit=seconds)
+        if answer.x is not None:
+            value = float(model.milp.form().q @ answer.x)
+            heapq.heappush(queue, (value, next(order), cuts, model, answer.x))
+
+    for hubs in fillings(len(grasps[0].facets)):
+        model = NestedCages(geometry, grasps, knots, hubs=hubs)
+        if model.feasible:
+            model.minimise_bends(1.0 if name == "miqp1" else BEND_WEIGHT)
+            if name == "miqp2":
+                model.milp.minimise([(-1.0, model.common_alpha())])
+            push(model, 0)
+    while queue:
+        _, _, cuts, model, x = heapq.heappop(queue)
+        topology = topology_of(model, x)
+        path = path_of(geometry, topology, knots, lambda m: finish(m, name))
+        if path is not None:
+            yield topology, path
+        if cuts < MOST_CUTS:
+            model.cut(x)
+            push(model, cuts + 1)
