@@ -15,8 +15,9 @@ from dlm.perception.video import check_video
 
 BLURRED_PASSES = 4
 """Fits with the object's colour corrected in between."""
-STARTS = 3
-POOR = 25.0
+FINER = 2
+"""A finer outline has so many times more corners."""
+POOR = 12.0
 """Mean square of the errors over that of the noise beyond which another start is tried."""
 
 
@@ -40,22 +41,29 @@ def perceive(
 
 
 def _best_start(seen: Observation, settings: PerceptionSettings) -> tuple[Scene, Observation]:
-    """Fitted from the clearest frame's outline, or from another where that explains the video much better."""
-    best, least = None, np.inf
-    for reference in clearest_frames(seen)[:STARTS]:
-        scene = first_scene(seen, int(reference), settings.most_vertices)
-        trusted = without_outliers(scene, seen)
-        for _ in range(BLURRED_PASSES if settings.blur > 0 else 1):
-            trusted = calibrated(scene, trusted)
-            scene, _ = fit(scene, trusted)
-        _, error = boundary_variance(scene, seen)
-        if error < least:
-            best, least = (scene, trusted), error
-        if error < POOR:
+    """Fitted from the clearest frame's outline; where that explains little, from a finer one, then from another frame."""
+    first, second = (int(t) for t in clearest_frames(seen)[:2])
+    fine = FINER * settings.most_vertices
+    best, least = _started(seen, first, settings.most_vertices, settings)
+    for reference in (first, second):
+        if least < POOR:
             break
-    if best is None:
-        raise RuntimeError("no start was tried")
+        other, error = _started(seen, reference, fine, settings)
+        if error < least:
+            best, least = other, error
     return best
+
+
+def _started(
+    seen: Observation, reference: int, most_vertices: int, settings: PerceptionSettings
+) -> tuple[tuple[Scene, Observation], float]:
+    """Scene fitted from one frame's outline, the observation without what hides it, and the error over the noise's."""
+    scene = first_scene(seen, reference, most_vertices)
+    trusted = without_outliers(scene, seen)
+    for _ in range(BLURRED_PASSES if settings.blur > 0 else 1):
+        trusted = calibrated(scene, trusted)
+        scene, _ = fit(scene, trusted)
+    return (scene, trusted), boundary_variance(scene, seen)[1]
 
 
 def _observation(look: Appearance, windows: Windows, settings: PerceptionSettings) -> Observation:

@@ -74,7 +74,7 @@ def _crossings(start: float, extent: float) -> tuple[float, float]:
     return np.inf, np.inf
 
 
-SHARPEST = 0.1
+SHARPEST = 0.3
 """Corners are wider than this [rad]."""
 
 
