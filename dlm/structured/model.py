@@ -13,6 +13,7 @@ from dlm.perception import Perceived, PerceptionSettings, perceive
 from dlm.structured.calibration import Calibration, deflated
 from dlm.structured.planners import Answer, ClassPlanner, Planner
 from dlm.structured.planning import Planning
+from dlm.structured.trial import Trial
 from expert.errors import InvalidProblem, SolverFailed
 from expert.types import ContactTask, Plan
 
@@ -74,11 +75,14 @@ class StructuredModel:
     perceive: Perceive = perceive
 
     @classmethod
-    def shipped(cls, *, best_guess: bool = False) -> "StructuredModel":
-        """With the weights that come with the package; best_guess: only the likeliest contact class is checked."""
+    def shipped(cls, *, best_guess: bool = False, robust: bool = True) -> "StructuredModel":
+        """With the weights that come with the package.
+
+        best_guess: only the likeliest contact class is checked.  robust: plans are tried out before one is picked.
+        """
         from dlm.structured.weights import SHIPPED, trained_model  # it builds models, from policies
 
-        return trained_model(SHIPPED, best_guess=best_guess)
+        return trained_model(SHIPPED, best_guess=best_guess, trial=Trial() if robust else None)
 
     def calibrated(self, calibration: Calibration) -> "StructuredModel":
         """With corrections, each kept to what makes sense."""
@@ -133,7 +137,7 @@ class StructuredModel:
         status: Status = "planned"
         reason = ""
         if answer.risk > self.planner.acceptable:
-            status, reason = "risky", f"in simulation its loss is up to {answer.risk:.2g} cm^2"
+            status, reason = "risky", f"in trial simulations its loss is {answer.risk:.2g} cm^2 on average"
         if perceived.status != "ok":
             status, reason = "poor_fit", perceived.reason
         return Planned(

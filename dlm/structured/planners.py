@@ -17,7 +17,7 @@ from expert.types import ContactTask, IntArray, Plan
 class Answer(NamedTuple):
     """plan: None where none was found, which proves nothing.  task: the one it solves.  checked: classes looked at.
 
-    risk: loss in the worst trial [cm^2]; 0 without trials.
+    risk: of `Trial.risk` [cm^2]; 0 without trials.
     """
 
     plan: Plan | None
@@ -63,7 +63,7 @@ class ClassPlanner:
                 plan = check(task, modes, node_limit=self.node_limit, model=model).plan
                 if plan is None:
                     break
-                risk = 0.0 if self.trial is None else self.trial.loss(task, plan)
+                risk = 0.0 if self.trial is None else self.trial.risk(task, plan)
                 if safest.plan is None or risk < safest.risk:
                     safest = Answer(plan, task, checked, risk)
                 if self.trial is None or risk <= self.trial.good:

@@ -69,8 +69,8 @@ class ProposalPolicy(Policy):
         super().__init__()
         self.scorer, self.widths, self.widen = scorer, widths, widen
         self.knobs = nn.Parameter(torch.zeros(len(NAMES), dtype=torch.float64))
-        planner = ClassPlanner(schedules=scorer.schedules, propose=self.propose)
-        self.base = replace(model, planner=planner)
+        self.planner = ClassPlanner(schedules=scorer.schedules, propose=self.propose)
+        self.base = replace(model, planner=self.planner)
 
     def propose(self, task: ContactTask) -> list[IntArray]:
         """Batches of classes, the likeliest first; without widening, only the first batch."""

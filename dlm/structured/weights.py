@@ -12,22 +12,24 @@ import torch
 from dlm.checkpoint import load, restore_weights
 from dlm.structured.model import StructuredModel
 from dlm.structured.policies import StructuredArchitecture
+from dlm.structured.trial import Trial
 
 SHIPPED = Path(__file__).with_name("weights.safetensors")
 COMMAND = "python train.py experiment=large"
 
 
-def trained_model(path: Path, *, best_guess: bool = False) -> StructuredModel:
+def trained_model(path: Path, *, best_guess: bool = False, trial: Trial | None = None) -> StructuredModel:
     """The model with the scorer and the calibration of a checkpoint of a stage with proposals.
 
-    best_guess: check the likeliest class alone.  Raises InvalidProblem for a missing or damaged file, and for weights of
+    best_guess: check the likeliest class alone.  trial: what plans must survive.  Raises InvalidProblem for a missing or damaged file, and for weights of
     another model.
     """
     architecture = StructuredArchitecture()
     policy = architecture.proposer("best_guess" if best_guess else "proposals")
     restore_weights(policy.weights(), load(path, command=COMMAND), name=architecture.name, source=path)
     policy.eval()
-    return policy.model
+    model = policy.model
+    return replace(model, planner=replace(policy.planner, trial=trial))
 
 
 def strip(source: Path, target: Path) -> None:

@@ -57,7 +57,8 @@ MOST_SECONDS = 0.110
 """Median of one video."""
 MODELS: dict[str, Callable[[], StructuredModel]] = {
     "shipped": StructuredModel.shipped,
-    "best guess": lambda: StructuredModel.shipped(best_guess=True),
+    "without trials": lambda: StructuredModel.shipped(robust=False),
+    "best guess": lambda: StructuredModel.shipped(best_guess=True, robust=False),
     "no learning": StructuredModel,
     "expert on perceived geometry": lambda: StructuredModel(planner=ExpertPlanner()),
 }
@@ -172,6 +173,7 @@ def summary(records: list[Record]) -> dict[str, object]:
         "dropped": sum(bool(r["dropped"]) for r in records),
         "no plan": sum(r["status"] in ("no_plan", "refused") for r in records),
         "poor fit": sum(r["status"] == "poor_fit" for r in records),
+        "risky": sum(r["status"] == "risky" for r in records),
         "milliseconds": 1e3 * float(np.median([float(str(r["seconds"])) for r in records])),
         "p95": 1e3 * float(np.quantile([float(str(r["seconds"])) for r in records], 0.95)),
         "missed": [
@@ -222,7 +224,7 @@ def missed(row: dict) -> list[str]:
         found.append(f"{name}: within {row['within']:.3f} < {least}")
     if row["disturbance"] == "clean" and row["median"] > MEDIAN_BAR:
         found.append(f"{name}: median {row['median']:.5f} > {MEDIAN_BAR}")
-    if row["milliseconds"] > 1e3 * MOST_SECONDS:
+    if row["milliseconds"] > 1e3 * MOST_SECONDS:  # though the bar is meant without trials
         found.append(f"{name}: {row['milliseconds']:.0f} ms > {1e3 * MOST_SECONDS:.0f} ms")
     return found
 
@@ -248,7 +250,18 @@ def main() -> int:
         {"model": name, "kind": kind, "disturbance": disturbance, **summary(found)}
         for name, kind, disturbance, found in rows_of(options, samples, Records(options.records), console)
     ]
-    columns = ("tasks", "mean", "median", "within", "dropped", "no plan", "poor fit", "milliseconds", "p95")
+    columns = (
+        "tasks",
+        "mean",
+        "median",
+        "within",
+        "dropped",
+        "no plan",
+        "poor fit",
+        "risky",
+        "milliseconds",
+        "p95",
+    )
     table = Table("model", "facets", "video", *columns)
     for row in rows:
         numbers = [f"{row[c]:.3g}" if isinstance(row[c], float) else str(row[c]) for c in columns]

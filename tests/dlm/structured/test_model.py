@@ -138,19 +138,19 @@ def test_calibration_changes_what_it_names_and_stays_sensible() -> None:
 def test_a_trial_tells_a_sound_plan_from_one_that_drops_the_object(tasks: TaskBatch) -> None:
     k = next(i for i, s in enumerate(tasks.samples) if "lift" in s.family)
     sample, trial = tasks.samples[k], Trial()
-    assert trial.loss(sample.task, sample.plan) < trial.good
+    assert trial.risk(sample.task, sample.plan) < trial.good
     centres = sample.task.trajectory.poses[:, None, :2]
     wide = replace(sample.plan, positions=centres + 1.1 * (sample.plan.positions - centres))
-    assert trial.loss(sample.task, wide) > 0.1
+    assert trial.risk(sample.task, wide) > 0.1
     broken = replace(sample.plan, forces=sample.plan.forces * np.nan)
-    assert not trial.loss(sample.task, broken) <= trial.good
+    assert not trial.risk(sample.task, broken) <= trial.good
 
 
 def test_what_fails_its_trial_is_replaced_or_called_risky(tasks: TaskBatch) -> None:
     class Suspicious(Trial):
         """Finds fault with the first plan that it sees."""
 
-        def loss(self, task: ContactTask, plan: Plan) -> float:
+        def risk(self, task: ContactTask, plan: Plan) -> float:
             seen.append(plan)
             return 1.0 if len(seen) == 1 else 0.5 if self.candidates == 2 else 0.0
 
