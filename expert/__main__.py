@@ -70,6 +70,7 @@ def _parser() -> argparse.ArgumentParser:
     draw = commands.add_parser("draw", help="picture or animation of a solution file")
     draw.add_argument("file", type=Path, help="solution file")
     draw.add_argument("-o", "--output", type=Path, required=True, help=".png, .svg, .pdf, .gif or .mp4")
+    draw.add_argument("--view", help="one part of the picture of a cage: workspace, slice or component")
     draw.set_defaults(command=_draw)
     return parser
 
@@ -136,16 +137,24 @@ def _verify(options: argparse.Namespace) -> int:
 def _draw(options: argparse.Namespace) -> int:
     writable(options.output)
     data = load(options.file)
-    if "solution" not in data:
+    if "solution" not in data and not problem_of(data).entry.views:
         raise InvalidProblem(
             "solution", expected="a solution file", got="a problem file", remedy="solve it first"
         )
-    solution = solution_of(data)
-    draw = solution.problem.entry.function("draw")
+    solution = solution_of(data) if "solution" in data else None
+    problem = solution.problem if solution else problem_of(data)
+    view = {"view": _view(options.view, problem.entry.views)} if options.view else {}
+    draw = problem.entry.function("draw")
     with _progress(f"drawing {options.output.name}"):
-        draw(solution.problem.task, solution.answer, options.output)
+        draw(problem.task, solution.answer if solution else None, options.output, **view)
     print(f"picture in {options.output}")
     return SOLVED
+
+
+def _view(name: str, known: tuple[str, ...]) -> str:
+    if name not in known:
+        raise InvalidProblem("view", expected=" or ".join(known) or "none for this kind", got=name)
+    return name
 
 
 def _interruptible(work: Callable[[], Any]) -> Any:

@@ -9,7 +9,7 @@ A kind's `format` module has
 and the other entries are
     solve(task, **options) -> answer         the answer has a `status`
     verify(task, answer) -> Report           answer is None for a problem file
-    draw(task, answer, path)                 picture or animation by the suffix of path
+    draw(task, answer, path)                 picture or animation by the suffix of path; draw(..., view=name) where it has views
 """
 
 import importlib
@@ -36,13 +36,18 @@ class Report(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Kind:
-    """Where the code of one problem kind lives.  solved: statuses that count as success."""
+    """Where the code of one problem kind lives.
+
+    solved: statuses that count as success.  views: parts of its picture that can be drawn alone; such a kind also draws
+    problem files that state what there is to draw.
+    """
 
     format: str
     solve: str
     verify: str
     draw: str
     solved: tuple[str, ...] = ("optimal",)
+    views: tuple[str, ...] = ()
 
     def function(self, role: str) -> Callable[..., Any]:
         """Import what this kind uses to `solve`, `verify` or `draw`, or a function of its `format` module."""
@@ -64,6 +69,7 @@ KINDS: dict[str, Kind] = {
         verify="expert.verify.cage:verify",
         draw="expert.drawing.cage:draw",
         solved=("caged",),
+        views=("all", "workspace", "slice", "component"),
     ),
     "certified_grasp": Kind(
         format="expert.files.certified_grasp",

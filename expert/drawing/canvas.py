@@ -141,6 +141,27 @@ def plain_axes(axes: Axes, low: Array, high: Array) -> None:
         spine.set_color("#cccccc")
 
 
+def framed_axes(axes: Axes, points: Array, margin: float = 0.06) -> None:
+    """Equal scales around points (k, 2), with a margin relative to their extent."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    pad = margin * float((high - low).max())
+    plain_axes(axes, low - pad, high + pad)
+
+
+def scale_bar(axes: Axes) -> None:
+    """A bar of 1, 2 or 5 times a power of ten, about a quarter of the picture wide, with its length in mm below the picture."""
+    (left, right), bottom = axes.get_xlim(), axes.get_ylim()[0]
+    width = right - left
+    lengths = np.outer([1, 2, 5], 10.0 ** np.arange(-7, 3)).ravel()
+    length = float(lengths[lengths <= 0.3 * width].max())
+    y = bottom + 0.035 * width
+    ends = (left + 0.04 * width, left + 0.04 * width + length)
+    axes.plot(ends, (y, y), color=EDGE, lw=2.5, solid_capstyle="butt", zorder=8)
+    axes.text(
+        sum(ends) / 2, y + 0.02 * width, f"{1e3 * length:g} mm", ha="center", fontsize=7, color=EDGE, zorder=8
+    )
+
+
 def draw_wall(axes: Axes, wall: HalfPlane, reach: float) -> None:
     """The solid side of a half-plane, out to `reach` [m], with its surface as a line."""
     along = reach * perpendicular(wall.normal)

@@ -4,14 +4,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from PIL import Image
 
 from expert.__main__ import main
-from expert.caging.problem import Arrangement, Shape
-from expert.caging.shapes import named_shape
+from expert.caging.problem import Arrangement, CageProblem, Shape
+from expert.caging.shapes import named_shape, random_polygon
+from expert.caging.synthesis import solve
 from expert.drawing.cage import draw
+from expert.drawing.cage_component import linked_slices
+from expert.drawing.cage_slice import enclosing_loop
 from expert.errors import InvalidProblem
 from expert.files import read_problem
+from expert.verify.free_space import obstacles_at
 
 PROBLEMS = Path("configs/problem/cage")
 
@@ -56,3 +61,41 @@ def test_solve_verify_and_draw_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize("path", sorted(PROBLEMS.glob("*.yaml")), ids=lambda p: p.stem)
 def test_every_problem_file_is_read(path: Path) -> None:
     assert read_problem(path).kind == "cage"
+
+
+@pytest.mark.parametrize("view", ["workspace", "slice", "component"])
+def test_each_view_is_drawn_alone_from_a_problem_file_with_given_fingers(view: str, tmp_path: Path) -> None:
+    picture = tmp_path / "view.png"
+    assert main(["draw", str(PROBLEMS / "i_given.yaml"), "--view", view, "-o", str(picture)]) == 0
+    with Image.open(picture) as image:
+        assert image.size == (420, 400)
+        colours = np.unique(np.asarray(image.convert("RGB")).reshape(-1, 3), axis=0)
+    assert len(colours) > 50
+
+
+def test_an_unknown_view_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    picture = tmp_path / "view.png"
+    assert main(["draw", str(PROBLEMS / "i_given.yaml"), "--view", "inside", "-o", str(picture)]) == 2
+    assert "view: expected all or workspace or slice or component, got inside" in capsys.readouterr().err
+    assert not picture.exists()
+
+
+def test_the_drawn_loop_stays_in_obstacles_and_winds_once_around_the_start() -> None:
+    shape = Shape(vertices=random_polygon(np.random.default_rng(0), 4))
+    task = CageProblem(shape=shape, pose=np.array([0.1, 0.0, 0.5]), count=4)
+    answer = solve(task, time_limit=60, method="model")
+    assert answer.found
+    arrangement = task.arrangement(answer.fingers)
+    loop = enclosing_loop(arrangement, answer)
+    forbidden = shapely.union_all(obstacles_at(arrangement, 0.5)).buffer(1e-9)
+    assert forbidden.covers(shapely.LineString(loop))
+    angles = np.unwrap(np.arctan2(*(loop - arrangement.pose[:2]).T[::-1]))
+    assert abs(angles[-1] - angles[0]) == pytest.approx(2 * np.pi)
+
+
+def test_linked_slices_leave_out_what_the_start_cannot_reach() -> None:
+    a = arrangement("I", [[-0.02, 0], [0.02, 0]])
+    angles = np.radians(np.linspace(-20, 20, 9))
+    reached = linked_slices(a, angles)
+    assert all(len(parts) == 1 for parts in reached)
+    assert reached[4][0].covers(shapely.Point(0, 0))

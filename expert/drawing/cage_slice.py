@@ -1,0 +1,107 @@
+"""A slice of configuration space: what each obstacle forbids, what is free about the start, and the loop around it."""
+
+import numpy as np
+import shapely
+from matplotlib.axes import Axes
+
+from expert.caging.frame import Frame
+from expert.caging.problem import Arrangement
+from expert.caging.solution import CageSolution
+from expert.caging.swept import SweptGeometry
+from expert.drawing.cage_workspace import finger_colour
+from expert.drawing.canvas import EDGE, WALL, framed_axes, scale_bar
+from expert.geometry.pose import Array, rotation
+from expert.verify.free_space import free_components, obstacles_at
+
+FREE, ELSEWHERE, START, LOOP = "#2b7fd0", "#d3e6f7", "#111111", "#111111"
+SMALL = 0.1
+"""A free component below this share of the picture is shown once more, enlarged."""
+
+
+def draw_slice(axes: Axes, arrangement: Arrangement, answer: CageSolution | None) -> None:
+    """Positions of the reference point at the start orientation: obstacles in their fingers' colours, the bounded free component.
+
+    Dashed: the loop of obstacles that the model found, where it names one.
+    """
+    angle = float(arrangement.pose[2])
+    obstacles = obstacles_at(arrangement, angle)
+    free = free_components(arrangement, angle)
+    _draw_obstacles(axes, arrangement, obstacles)
+    _draw_free(axes, arrangement, free)
+    if answer is not None and answer.topology:
+        loop = enclosing_loop(arrangement, answer)
+        axes.plot(*loop.T, color=LOOP, lw=1.3, ls=(0, (3, 2)), zorder=5)
+    corners = shapely.get_coordinates(obstacles)
+    framed_axes(axes, corners, 0.04)
+    scale_bar(axes)
+    axes.set_title(f"slice at θ = {np.degrees(angle):.0f}°", fontsize=10)
+    start = shapely.Point(arrangement.pose[:2]).buffer(1e-3 * arrangement.shape.size)
+    around = [p for p in free if p.intersects(start)]
+    if around:
+        reach = np.abs(shapely.get_coordinates(around) - arrangement.pose[:2]).max()
+        if reach < SMALL * np.ptp(corners, axis=0).max():
+            _enlarge(axes, arrangement, obstacles, free, 1.5 * float(reach))
+
+
+def enclosing_loop(arrangement: Arrangement, answer: CageSolution) -> Array:
+    """Closed polyline (k, 2) [m] through the obstacles of the model's loop: points where pieces meet (Thesis Fig. 5-16)."""
+    frame = Frame.of(arrangement.shape, arrangement.pose)
+    geometry = SweptGeometry(frame.body(arrangement.shape.vertices), 0.0)
+    pieces = [frame.radius * piece + frame.centre for piece in geometry.pieces]
+    turn = rotation(float(arrangement.pose[2]))
+
+    def obstacle(finger: int, piece: int) -> shapely.Polygon:
+        return shapely.Polygon(arrangement.fingers[finger] - pieces[piece] @ turn.T)
+
+    points = []
+    for before, after in zip((answer.topology[-1], *answer.topology[:-1]), answer.topology, strict=True):
+        entry, exit_ = obstacle(after.element, before.next_piece), obstacle(after.element, after.piece)
+        following = obstacle(after.next_element, after.next_piece)
+        points += [entry.intersection(exit_).centroid, exit_.intersection(following).centroid]
+    return shapely.get_coordinates([*points, points[0]])
+
+
+def _draw_obstacles(axes: Axes, arrangement: Arrangement, obstacles: list[shapely.Polygon]) -> None:
+    for k, obstacle in enumerate(obstacles):
+        colour = finger_colour(k) if k < len(arrangement.fingers) else WALL
+        edge = colour if k < len(arrangement.fingers) else EDGE
+        ring = np.array(obstacle.exterior.coords).T
+        axes.fill(*ring, color=colour, alpha=0.28, lw=0, zorder=1)
+        axes.plot(*ring, color=edge, lw=0.9, alpha=0.9, zorder=2)
+
+
+def _draw_free(axes: Axes, arrangement: Arrangement, free: list[shapely.Polygon]) -> None:
+    start = shapely.Point(arrangement.pose[:2]).buffer(1e-3 * arrangement.shape.size)
+    for component in free:
+        colour = FREE if component.intersects(start) else ELSEWHERE
+        axes.fill(*np.array(component.exterior.coords).T, color=colour, ec=FREE, lw=0.9, zorder=3)
+        for hole in component.interiors:
+            axes.fill(*np.array(hole.coords).T, color="white", ec=FREE, lw=0.8, zorder=3)
+    axes.plot(*arrangement.pose[:2], "+", color=START, ms=8, mew=1.4, zorder=6)
+
+
+def _enlarge(
+    axes: Axes,
+    arrangement: Arrangement,
+    obstacles: list[shapely.Polygon],
+    free: list[shapely.Polygon],
+    reach: float,
+) -> None:
+    """The surroundings of the start in a window of their own, in the corner that hides least."""
+    low, high = (np.array(limits) for limits in zip(axes.get_xlim(), axes.get_ylim(), strict=True))
+    union = shapely.union_all(obstacles)
+
+    def hidden(corner: tuple[float, float]) -> float:
+        a = low + np.array(corner) * (high - low)
+        return float(union.intersection(shapely.box(*a, *(a + 0.36 * (high - low)))).area)
+
+    corner = min([(0.62, 0.62), (0.02, 0.62), (0.62, 0.02)], key=hidden)
+    window = axes.inset_axes((*corner, 0.36, 0.36), zorder=7)
+    _draw_obstacles(window, arrangement, obstacles)
+    _draw_free(window, arrangement, free)
+    start = arrangement.pose[:2]
+    framed_axes(window, np.stack([start - reach, start + reach]), 0.0)
+    scale_bar(window)
+    for spine in window.spines.values():
+        spine.set_color(EDGE)
+    axes.indicate_inset_zoom(window, edgecolor=EDGE, alpha=0.7)
