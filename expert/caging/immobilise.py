@@ -2,8 +2,8 @@
 
 Three fingers  the contacts of a disc that is largest in its neighbourhood (Czyzowicz, Stojmenovic, Urrutia 1999: they
                immobilise).
-Two fingers    a reflex corner and the nearest point of an edge, or two reflex corners, across the object (squeezing) or
-               across free space (stretching), where the distance is locally least or greatest.
+Two fingers    a reflex corner and the nearest point of an edge, or two reflex corners, where the distance is locally
+               least (squeezing) or greatest (stretching).
 
 These are candidates only: every one must be verified.
 """
@@ -13,18 +13,20 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from expert.geometry.polygon import contains, facet_frames, facets, reflex_vertices, signed_distance
+from expert.geometry.polygon import facet_frames, facets, reflex_vertices, signed_distance
 from expert.geometry.pose import Array
 
 CLEARANCES = (0.04, 0.02, 0.01, 0.005, 0.0025)
 """Tried in this order, relative to the object's size."""
+SPANNING = 1e-3
+"""Neighbouring directions of three contacts are less than half a turn apart by this angle [rad]."""
 STARTS = 8
 """Newton's method starts so often for each triple of features."""
 
 
 def candidates(vertices: Array, count: int, size: float, rng: np.random.Generator) -> Iterator[Array]:
-    """Fingers (count, 2) in the body frame, the loosest first; for count > 3 the further ones touch other facets."""
-    grasps = list(_pairs(vertices) if count == 2 else _discs(vertices, rng))
+    """Fingers (count, 2) in the body frame, the loosest first; fingers beyond those that hold it stand near other facets."""
+    grasps = [*(_discs(vertices, rng) if count > 2 else ()), *_pairs(vertices)]
     for clearance in CLEARANCES:
         for contacts, outward in grasps:
             fingers = contacts + clearance * size * outward
@@ -97,7 +99,7 @@ def _held(vertices: Array, centre: Array, radius: float) -> Iterator[tuple[Array
         outward = (contacts - centre) / np.linalg.norm(contacts - centre, axis=1, keepdims=True)
         angles = np.sort(np.arctan2(outward[:, 1], outward[:, 0]))
         gaps = np.diff(np.append(angles, angles[0] + 2 * np.pi))
-        if gaps.max() < np.pi - 0.02:
+        if gaps.max() < np.pi - SPANNING:
             yield contacts, outward
 
 
@@ -108,17 +110,32 @@ def _nearest_on_facets(vertices: Array, x: Array) -> Array:
 
 
 def _pairs(vertices: Array) -> Iterator[tuple[Array, Array]]:
-    """Contacts (2, 2) and directions in which to move off: reflex corners with corners or edges that face them."""
+    """Contacts (2, 2) and directions in which to move off, where the fingers' distance is locally least or greatest.
+
+    Every cage of a polygon by two fingers can be squeezed or stretched to such contacts (Vahedi, van der Stappen 2008).
+    """
     reflex = np.flatnonzero(reflex_vertices(vertices))
+    inward, _ = facet_frames(vertices)
     for k in reflex:
         nearest = _nearest_on_facets(vertices, vertices[k])
-        others = [*vertices[reflex[reflex > k]], *nearest]
-        for other in others:
-            gap = vertices[k] - other
-            length = float(np.linalg.norm(gap))
-            if length < 1e-9:
-                continue
-            along = gap / length
-            across = bool(contains(vertices, (vertices[k] + other) / 2))
-            away = along if across else -along
-            yield np.array([vertices[k], other]), np.array([away, -away])
+        for foot, normal in zip(nearest, inward, strict=True):
+            away = _direction(foot, vertices[k])
+            if abs(away @ normal - 1) < 1e-9 and _opens(vertices, k, away):
+                yield np.array([vertices[k], foot]), np.array([away, -away])
+        for j in reflex[reflex > k]:
+            along = _direction(vertices[j], vertices[k])
+            for away in (along, -along):
+                if _opens(vertices, k, away) and _opens(vertices, j, -away):
+                    yield vertices[[k, j]], np.array([away, -away])
+
+
+def _direction(a: Array, b: Array) -> Array:
+    """Unit vector from a to b; zero where they coincide."""
+    return (b - a) / max(float(np.linalg.norm(b - a)), 1e-12)
+
+
+def _opens(vertices: Array, corner: np.intp, away: Array) -> bool:
+    """Whether a finger in a reflex corner moves ahead in direction `away`, or sideways, whichever way it is free to move."""
+    v = vertices[corner]
+    ahead, behind = vertices[(corner + 1) % len(vertices)], vertices[corner - 1]
+    return bool(_direction(v, ahead) @ away > -1e-9 and _direction(v, behind) @ away > -1e-9)

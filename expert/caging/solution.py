@@ -30,7 +30,7 @@ class CageSolution:
     status: caged (verified), none_found (no cage of the kind that was searched for, at the half-ranges tried: not a
     proof that none exists), time_limit (nothing verified in time).
     fingers (count, 2) [m], without the fixed ones.  rotation_range: verified orientations [rad].
-    objective: cost [m or m^2], nan without cost.  attempts: models solved.  refuted, unconfirmed: answers of the model
+    objective: cost [m or m^2], nan without cost.  seconds: processor time.  attempts: models solved and grasps tried.  refuted, unconfirmed: answers of the model
     that the verifier refuted or could not decide; they were cut off.
     """
 

@@ -1,7 +1,7 @@
 """Find fingers that cage an object: solve the model over a ladder of rotation ranges, verify, cut off what is refuted.
 
-No answer leaves unverified.  Cages around immobilising grasps are tried between the quick and the thorough part of the
-ladder, or first of all where walls, fixed fingers, grippers or a cost take part.
+No answer leaves unverified.  Cages around immobilising grasps are tried after the first rung of the ladder, or first of
+all where walls, fixed fingers, grippers or a cost take part.
 """
 
 import itertools
@@ -80,8 +80,8 @@ class Tally:
 
     @property
     def left(self) -> float:
-        """Time that is left [s]."""
-        return self.deadline - time.perf_counter()
+        """Processor time that is left [s]: what is found does not depend on the machine's load."""
+        return self.deadline - time.thread_time()
 
     @property
     def done(self) -> bool:
@@ -121,7 +121,9 @@ def solve(
     method: Method = "swept",
     solver: Solver = "highs",
 ) -> CageSolution:
-    """A verified cage, the best found within time_limit [s] where there is a cost (Thesis 5.1, reformulated).
+    """A verified cage, the best found within time_limit where there is a cost (Thesis 5.1, reformulated).
+
+    time_limit [s] is processor time: what is found does not depend on the machine's load.
 
     Raises InvalidProblem for an arrangement whose fingers are given: there is nothing to solve; and for a problem that
     MIP1 (method thesis) does not know: walls, fixed fingers, grippers, costs.
@@ -132,21 +134,21 @@ def solve(
         )
     if problem.fewest:
         return _fewest(problem, time_limit, method, solver)
-    began = time.perf_counter()
+    began = time.thread_time()
     tally = Tally(problem, began + time_limit)
     if method == "thesis":
         _search_slices(tally, solver)
     else:
         _search_ranges(tally, method, solver)
-    return _answer(tally, time.perf_counter() - began)
+    return _answer(tally, time.thread_time() - began)
 
 
 def _fewest(problem: CageProblem, time_limit: float, method: Method, solver: Solver) -> CageSolution:
     """The first count of fingers, from the least, for which a cage is found; each has an equal share of the time left."""
-    began = time.perf_counter()
+    began = time.thread_time()
     answers: dict[int, CageSolution] = {}
     for count in range(max(0, 2 - len(problem.fixed)), problem.count + 1):
-        left = max(began + time_limit - time.perf_counter(), 0.0)
+        left = max(began + time_limit - time.thread_time(), 0.0)
         answers[count] = answer = solve(
             replace(problem, count=count, fewest=False),
             time_limit=left / (problem.count + 1 - count),
@@ -160,7 +162,7 @@ def _fewest(problem: CageProblem, time_limit: float, method: Method, solver: Sol
         answer,
         status="time_limit" if undecided and not answer.found else answer.status,
         reason="; ".join(f"{n} fingers: {KNOWN[other.status]}" for n, other in answers.items()),
-        seconds=time.perf_counter() - began,
+        seconds=time.thread_time() - began,
         attempts=sum(other.attempts for other in answers.values()),
         refuted=sum(other.refuted for other in answers.values()),
         unconfirmed=sum(other.unconfirmed for other in answers.values()),
@@ -231,17 +233,18 @@ def _answer(tally: Tally, seconds: float) -> CageSolution:
 
 
 def _attempts(problem: CageProblem, method: Method) -> Iterator[Attempt | None]:
-    """Quick models, grasps (None), then models of growing size and time."""
+    """A quick model, grasps (None), more quick models, then models of growing size and time."""
     plain = problem.cost == "none" and not _restricted(problem)
     if not plain and method != "model":
         yield None
     middle = TIGHT if _restricted(problem) else WIDE
     ranges = problem.rotation or (LADDER if plain else sorted(LADDER, key=lambda r: abs(sum(r) - middle)))
     few = problem.count + len(problem.fixed) == 2 and not len(problem.walls)
-    if plain and not few:
-        yield from (Attempt(below, above, 3, True, 0.4) for below, above in ranges[:QUICK])
+    quick = [Attempt(below, above, 3, True, 0.4) for below, above in ranges[:QUICK] if plain and not few]
+    yield from quick[:1]
     if plain and method != "model":
         yield None
+    yield from quick[1:]
     sizes = (False,) if few or problem.grippers else (True, False)
     slices = (1.0, 4.0, 16.0, 64.0) if plain else (3.0, 10.0, 30.0)
     for seconds, (below, above), one_piece in itertools.product(slices, ranges, sizes):

@@ -1,6 +1,7 @@
 """SCIP, HiGHS and Gurobi behind one form; each says what it proved and nothing more.  One thread each."""
 
 import importlib
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -127,21 +128,23 @@ def _finite(bound: float) -> float | None:
 
 
 def highs(form: StandardForm, gap: float, time_limit: float) -> Answer:
-    """Linear objectives only.  Raises InvalidProblem for a quadratic one."""
+    """Linear objectives only; time_limit is processor time where there are integers.  Raises InvalidProblem for squares."""
     if not form.is_linear:
         raise InvalidProblem("solver", expected="scip or gurobi for a quadratic objective", got="highs")
     model = highspy.Highs()
+    is_mip = bool(form.integral.any())
     for option, value in {
         "output_flag": False,
         "mip_rel_gap": gap,
-        "time_limit": float(time_limit),
+        "time_limit": np.inf if is_mip else float(time_limit),
         "threads": 1,
     }.items():
         model.setOptionValue(option, value)
+    if is_mip:
+        _stop_after(model, time_limit)
     model.passModel(_highs_model(form))
     model.run()
     info, word = model.getInfo(), model.getModelStatus().name
-    is_mip = bool(form.integral.any())
     found = info.primal_solution_status == 2  # kSolutionStatusFeasible
     status: Status = "failed"
     if word == "kOptimal":
@@ -158,6 +161,17 @@ def highs(form: StandardForm, gap: float, time_limit: float) -> Answer:
         bound = info.objective_function_value
     bound = np.inf if status == "infeasible" else bound
     return Answer(status=status, x=point, bound=bound, nodes=max(int(info.mip_node_count), 0), message=word)
+
+
+def _stop_after(model: highspy.Highs, seconds: float) -> None:
+    """Interrupt branch and bound after so much processor time: its own limit is wall time, which depends on the load."""
+    began = time.thread_time()
+
+    def stop(kind: object, message: str, seen: object, answer: Any, data: object) -> None:
+        answer.user_interrupt = time.thread_time() - began > seconds
+
+    model.setCallback(stop, None)
+    model.startCallback(highspy.cb.HighsCallbackType.kCallbackMipInterrupt)
 
 
 def _highs_model(form: StandardForm) -> highspy.HighsLp:
