@@ -5,6 +5,7 @@
 3. With these fixed the whole path is a convex program: least acceleration among those that keep the region of attraction.
 """
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -13,6 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from expert.geometry.pose import Array
+from expert.grasping.facets import Facets, rays
 from expert.grasping.goal_cell import MIN_WEIGHT, SUM_WEIGHT
 from expert.grasping.nested import FacetGeometry, Grasp, Knot, NestedCages
 from expert.mip.backends import StandardForm
@@ -34,7 +36,7 @@ def topologies(
     geometry: FacetGeometry, grasp: Grasp, knots: Sequence[Knot], seconds: float
 ) -> Iterator[Topology]:
     """For each filling the topology of the largest start, where the end knots of the grasp exist at all."""
-    for hubs in fillings(len(grasp.facets)):
+    for hubs in fillings(geometry.table, grasp):
         model = NestedCages(geometry, [grasp], [knots[0], knots[-1]], hubs=hubs)
         if not model.feasible:
             return
@@ -44,9 +46,23 @@ def topologies(
             yield topology_of(model, x)
 
 
-def fillings(count: int) -> list[tuple[int, int]]:
-    """Ways to fill the loop below and above the goal: the diagonals of a square."""
-    return [(0, 0)] if count == 3 else [(0, 0), (0, 1), (1, 0), (1, 1)]
+def fillings(table: Facets, grasp: Grasp) -> list[tuple[int, int]]:
+    """Ways to fill the loop below and above the goal that agree with the rays which shut it there.
+
+    The diagonal of a square of fingers must leave a ray's three fingers in one triangle, and join a ray's two.
+    """
+    if len(grasp.facets) == 3:
+        return [(0, 0)]
+    weights = rays(table.normals[list(grasp.facets)])
+    return list(itertools.product(_hubs(weights[grasp.down]), _hubs(weights[grasp.up])))
+
+
+def _hubs(ray: Array) -> list[int]:
+    support = np.flatnonzero(ray)
+    if len(support) == 3:
+        return [int(np.flatnonzero(ray == 0)[0] + 1) % 2]
+    i, j = support
+    return [int(i % 2)] if (j - i) % 2 == 0 else [0, 1]
 
 
 def topology_of(model: NestedCages, x: Array) -> Topology:

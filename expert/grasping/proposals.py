@@ -35,8 +35,10 @@ ENLARGED = 10
 """So many goal cells, the best by 5-CT16, have the area of their start maximised."""
 FIRMNESS = 0.5
 """Share of the largest moment that could hold the object in the end which smoothing must leave."""
-BATCH, MIP_SECONDS = 8, 5.0
+BATCH, MIP_SECONDS = 24, 5.0
 """The decomposed search ranks so many grasps at once, and gives each choice of a topology this long [s]."""
+PROGRAM_SHARE = 0.2
+"""Share of the time limit that each program of MIQP1 and MIQP2 may take."""
 SHARES = (0.98, 0.75)
 """Shares of its region of attraction that a path of the decomposed search is tried with."""
 
@@ -183,7 +185,7 @@ def thesis(search: Search, name: Name) -> Iterator[Proposal]:
         return
     geometry = FacetGeometry(search.table.vertices, search.margin)
     knots = schedule(search.problem.half_ranges, search.margin)
-    for topology, path in solutions(geometry, grasps, knots, name, MIP_SECONDS):
+    for topology, path in solutions(geometry, grasps, knots, name, PROGRAM_SHARE * search.left):
         facets = topology.grasp.facets
         yield Proposal(path, facets, _free_region(search, facets, path[0]), name)
         if search.left <= 0:

@@ -47,8 +47,12 @@ def solutions(
             value = float(model.milp.form().q @ answer.x)
             heapq.heappush(queue, (value, next(order), cuts, model, answer.x))
 
-    for hubs in fillings(len(grasps[0].facets)):
-        model = NestedCages(geometry, grasps, knots, hubs=hubs)
+    programs: dict[tuple[int, int], list[Grasp]] = {}
+    for grasp in grasps:
+        for hubs in fillings(geometry.table, grasp):
+            programs.setdefault(hubs, []).append(grasp)
+    for hubs, alike in programs.items():
+        model = NestedCages(geometry, alike, knots, hubs=hubs)
         if model.feasible:
             model.minimise_bends(1.0 if name == "miqp1" else BEND_WEIGHT)
             if name == "miqp2":
