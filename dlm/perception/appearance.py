@@ -43,8 +43,8 @@ class Appearance:
     contrast: Array
 
 
-def separate(video: Frames, camera: Camera, floor: bool, blur: float = 0.0) -> Appearance:
-    """Unmix a video of one object.  Raises InvalidProblem where nothing stands out from the background.
+def separate(video: Frames, camera: Camera, floor: bool, blur: float = 0.0, codec: float = 0.0) -> Appearance:
+    """Unmix a video of one object; see PerceptionSettings.  Raises InvalidProblem where nothing stands out from the background.
 
     The object is above the floor, so that it hides the wall alone, even where a pixel or the blur mixes all three.
     """
@@ -52,7 +52,8 @@ def separate(video: Frames, camera: Camera, floor: bool, blur: float = 0.0) -> A
     ground = ground_coverage(camera)[::-1] if floor else np.zeros((camera.size, camera.size))
     if blur > 0:
         ground = ndimage.gaussian_filter1d(ground, blur, axis=0, mode="nearest")
-    light, wall, background, noise = _background(images, ground)
+    light, wall, background, plain_noise = _background(images, ground)
+    noise = float(np.hypot(plain_noise, codec))
     plain = images / light[..., None]
     line = _object_colour(plain, background, noise, blur) - wall
     length = float(line @ line)

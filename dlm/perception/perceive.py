@@ -30,7 +30,7 @@ def perceive(
     """
     camera, settings = camera or Camera(), settings or PerceptionSettings()
     check_video(video, camera)
-    look = separate(video, camera, settings.floor, settings.blur)
+    look = separate(video, camera, settings.floor, settings.blur, settings.codec)
     windows = segment(look, MARGIN + int(np.ceil(3 * settings.blur)))
     seen = _observation(look, windows, settings)
     scene, seen = _best_start(seen, settings)

@@ -15,8 +15,8 @@ from expert.types import IntArray
 
 HARMONICS = 16
 ANGLES = 720
-RIVALS = 3
-"""Turns that are tried in each frame."""
+NEAREST = 2
+"""Turns that are tried in each frame besides the most likely one: those next to the frame before."""
 SMOOTH = 0.5
 """Blur under which the first outline is drawn [pixels]."""
 BAD_FRAME = 9.0
@@ -37,7 +37,8 @@ def first_scene(seen: Observation, reference: int, most_vertices: int) -> Scene:
     for order in (range(reference + 1, steps), range(reference - 1, -1, -1)):
         for t in order:
             nearest = motion[t - 1 if t > reference else t + 1, 2]
-            motion[t] = _aligned(scene, seen, t, _turns(spectra[reference], spectra[t]), nearest)
+            turns = _likely(_turns(spectra[reference], spectra[t]), nearest)
+            motion[t] = _aligned(scene, seen, t, turns, nearest)
     scene, _ = fit(scene.seen_from_first_step(), seen)
     return _realigned(scene, seen)
 
@@ -114,7 +115,12 @@ def _turns(before: Array, after: Array) -> Array:
     match = np.fft.ifft(spectrum).real
     peaks = np.flatnonzero((match >= np.roll(match, 1)) & (match > np.roll(match, -1)))
     best = peaks[np.argsort(match[peaks])[::-1]]
-    return 2 * np.pi / ANGLES * best[match[best] > 0.6 * match.max()][:RIVALS]
+    return 2 * np.pi / ANGLES * best[match[best] > 0.6 * match.max()]
+
+
+def _likely(turns: Array, nearest: float) -> Array:
+    distance = np.abs(np.mod(turns - nearest + np.pi, 2 * np.pi) - np.pi)
+    return turns[np.unique([0, *np.argsort(distance)[:NEAREST]])]
 
 
 def _aligned(scene: Scene, seen: Observation, t: int, turns: Iterable[float], nearest: float) -> Array:

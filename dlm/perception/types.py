@@ -18,17 +18,20 @@ class PerceptionSettings:
     blur: standard deviation of the camera's known blur [pixels].  most_vertices: corners of the first outline, from
     which needless ones are removed.  snap: vertices within this distance of the floor may be taken to touch it, and to
     stay where they are if they move along it by less [pixels]; the data decides.  tolerance: the model's rms error
-    over the noise beyond which a fit is called poor, in units of the noise plus 4 grey levels.
+    over the noise beyond which a fit is called poor, in units of the noise plus 4 grey levels.  codec: errors that
+    compression left near edges, where no plain background tells of them; added to the noise [grey levels].
     """
 
     floor: bool = True
     blur: float = 0.0
+    codec: float = 0.0
     most_vertices: int = 16
     snap: float = 0.25
     tolerance: float = 2.0
 
     def __post_init__(self) -> None:
         require(0 <= self.blur <= 5, "perception.blur", "0 to 5 pixels", self.blur)
+        require(0 <= self.codec <= 100, "perception.codec", "0 to 100 grey levels", self.codec)
         require(
             3 <= self.most_vertices <= 64,
             "perception.most_vertices",

@@ -5,14 +5,13 @@
 Thresholds were tuned with --validation; figures come from the other seeds.  Errors of a video: the largest over its frames
 of angle and of position of the centre of mass, and the Hausdorff distance between true and seen outline.  `contacts` is
 the share of videos whose contacts with the floor (which side, sticking or sliding, at which step) are all as in truth.
-Times are processor time of one core.
+`unnoticed`: off by more than 2 mm or 2 deg, yet called ok.  Times are processor time of one core.
 """
 
 import argparse
 import json
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,16 +23,21 @@ from rich.table import Table
 
 from datasets.disturb import DISTURBANCES, random_palette
 from datasets.motions import FAMILIES, NoRoom, sample_task
-from datasets.render import Camera, Palette, render
-from datasets.shapes import Shapes
+from datasets.render import Camera, Frames, Palette, render
+from datasets.shapes import ShapeFamily, Shapes
+from datasets.shapes_omnipush import OmniPush
 from datasets.specification import generator
 from dlm.perception import Perceived, PerceptionSettings, perceive
 from expert.errors import InvalidProblem
 from expert.mechanics import external_contacts
 from expert.types import Body, ContactTask, Trajectory
+from tests.dlm.perception.mujoco_video import mujoco_videos
 
-KINDS = {"4-6": Shapes(), "12": Shapes(facets=(12, 12))}
+KINDS: dict[str, ShapeFamily] = {"4-6": Shapes(), "12": Shapes(facets=(12, 12)), "omnipush": OmniPush()}
 """Shapes by name."""
+MUJOCO = {"MuJoCo": False, "MuJoCo, lens": True}
+"""Videos of another engine: orthographic, or through a lens."""
+BOTH_SCALES = ("clean", "noise 3", "noise 5")
 BARS = {("4-6", "clean", "angle"): 0.1, ("4-6", "clean", "position"): 0.1, ("4-6", "noise 15", "angle"): 1.0}
 """Medians that must hold: angle [deg], position [mm]."""
 MOST_SECONDS = 0.08
@@ -77,26 +81,41 @@ def errors(seen: Perceived, task: ContactTask) -> Row:
     }
 
 
-def measure(kind: str, disturbance: str, scale: float, tasks: list[ContactTask], console: Console) -> dict:
+def videos_of(tasks: list[ContactTask], disturbance: str, camera: Camera) -> list[Frames] | None:
+    """One video per task; None where the engine is missing."""
+    scenes = [(task.body.vertices, task.trajectory.poses) for task in tasks]
+    if disturbance in MUJOCO:
+        return mujoco_videos(scenes, camera, perspective=MUJOCO[disturbance])
+    videos = []
+    for index, scene in enumerate(scenes):
+        rng = np.random.default_rng([index, 17])
+        palette = random_palette(rng) if disturbance == "colours" else Palette()
+        change = DISTURBANCES.get(disturbance, DISTURBANCES["clean"])
+        videos.append(change(render(*scene, camera, palette), rng))
+    return videos
+
+
+def measure(
+    kind: str, disturbance: str, scale: float, tasks: list[ContactTask], console: Console
+) -> dict | None:
     """Statistics over tasks of one kind under one disturbance."""
+    camera = Camera(scale=scale)
+    settings = PerceptionSettings(blur=1.0 if disturbance.startswith("blur") else 0.0)
+    videos = videos_of(tasks, disturbance, camera)
+    if videos is None:
+        return None
     rows: list[Row] = []
     refused: list[str] = []
     seconds = []
-    settings = PerceptionSettings(blur=1.0 if disturbance.startswith("blur") else 0.0)
-    camera = Camera(scale=scale)
     name = f"{kind} {disturbance} {1e3 * scale:.0f} mm"
-    for index, task in enumerate(
-        track(tasks, name, console=console, disable=not console.is_terminal, transient=True)
-    ):
-        rng = np.random.default_rng([index, 17])
-        palette = random_palette(rng) if disturbance == "colours" else Palette()
-        change: Callable = DISTURBANCES.get(disturbance, DISTURBANCES["clean"])
-        video = change(render(task.body.vertices, task.trajectory.poses, camera, palette), rng)
+    quiet = not console.is_terminal
+    pairs = list(zip(tasks, videos, strict=True))
+    for task, video in track(pairs, name, console=console, disable=quiet, transient=True):
         start = time.process_time()
         try:
             seen = perceive(video, camera, settings)
         except InvalidProblem as error:
-            refused.append(f"{index}: {error}")
+            refused.append(str(error))
             continue
         seconds.append(time.process_time() - start)
         rows.append(errors(seen, task))
@@ -107,6 +126,11 @@ def measure(kind: str, disturbance: str, scale: float, tasks: list[ContactTask],
         if key in ("angle", "position", "outline")
     }
     shares = {key: float(columns[key].mean()) for key in ("corners", "contacts", "ok") if columns}
+    if columns:
+        close = (columns["angle"] <= 2) & (columns["position"] <= 2)
+        # What was refused was not seen; what is off and called ok would go unnoticed.
+        shares["within"] = float(close.sum()) / len(tasks)
+        shares["unnoticed"] = float((~close & (columns["ok"] == 1)).sum()) / len(tasks)
     return {
         "kind": kind,
         "disturbance": disturbance,
@@ -114,7 +138,6 @@ def measure(kind: str, disturbance: str, scale: float, tasks: list[ContactTask],
         "tasks": len(tasks),
         **figures,
         **shares,
-        "within": float(np.mean((columns["angle"] <= 2) & (columns["position"] <= 2))) if columns else 0.0,
         "refused": refused,
         "milliseconds": 1e3 * float(np.median(seconds)) if seconds else np.nan,
         "slowest": 1e3 * float(np.max(seconds)) if seconds else np.nan,
@@ -136,10 +159,11 @@ def main() -> int:
     for kind in KINDS:
         tasks = tasks_of(kind, count, seeds)
         perceive(render(tasks[0].body.vertices, tasks[0].trajectory.poses))  # compiles
-        for disturbance in [*DISTURBANCES, "colours"]:
-            for scale in (0.004, 0.005):
+        for disturbance in [*DISTURBANCES, "colours", *MUJOCO]:
+            for scale in (0.004, 0.005) if disturbance in BOTH_SCALES else (0.004,):
                 if (options.only or "") in f"{kind} {disturbance} {scale}":
-                    rows.append(measure(kind, disturbance, scale, tasks, console))
+                    row = measure(kind, disturbance, scale, tasks, console)
+                    rows += [row] if row else []
     _print(rows)
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1))
@@ -149,24 +173,26 @@ def main() -> int:
 def _holds(row: dict) -> bool:
     key = row["kind"], row["disturbance"]
     bars = {k[2]: bar for k, bar in BARS.items() if k[:2] == key and row["scale"] == 0.004}
-    return (
-        all(row[name]["median"] <= bar for name, bar in bars.items())
-        and row["milliseconds"] <= 1e3 * MOST_SECONDS
-    )
+    # Objects of twenty facets start from a finer outline, which takes its time.
+    fast = row["milliseconds"] <= 1e3 * MOST_SECONDS or row["kind"] == "omnipush"
+    return fast and all(row[name]["median"] <= bar for name, bar in bars.items())
 
 
 def _print(rows: list[dict]) -> None:
     table = Table(title="angle [deg], position and outline [mm]: median / 95 % / largest")
     for column in ("shapes", "disturbance", "mm/px", "angle", "position", "outline", "corners", "contacts"):
         table.add_column(column)
-    for column in ("2 mm, 2 deg", "ok", "refused", "ms", "slowest"):
+    for column in ("2 mm, 2 deg", "ok", "unnoticed", "refused", "ms", "slowest"):
         table.add_column(column)
     for row in rows:
         three = [
             " / ".join(f"{row[key][q]:.3g}" for q in ("median", "p95", "max")) if key in row else "-"
             for key in ("angle", "position", "outline")
         ]
-        shares = [f"{row[key]:.3f}" if key in row else "-" for key in ("corners", "contacts", "within", "ok")]
+        shares = [
+            f"{row[key]:.3f}" if key in row else "-"
+            for key in ("corners", "contacts", "within", "ok", "unnoticed")
+        ]
         rest = [str(len(row["refused"])), f"{row['milliseconds']:.0f}", f"{row['slowest']:.0f}"]
         table.add_row(row["kind"], row["disturbance"], f"{1e3 * row['scale']:.0f}", *three, *shares, *rest)
     Console(width=170).print(table)
