@@ -9,7 +9,7 @@ else
 DATASETS := train finetune test family
 endif
 
-.PHONY: setup demo report test lint bench gallery clean
+.PHONY: setup demo report test lint bench gallery figures clean
 setup: .venv/installed
 
 .venv/installed: pyproject.toml
@@ -50,6 +50,17 @@ gallery: setup
 		$(BIN)/python -m expert solve $$file -o build/$$name.json || continue; \
 		$(BIN)/python -m expert verify build/$$name.json -o build/$$name.certificate.json || exit 1; \
 		for ending in png gif; do $(BIN)/python -m expert draw build/$$name.json -o docs/gallery/$$name.$$ending; done; \
+	done
+
+# Pictures of cages in docs/gallery.md (Fig. 5-14 to 5-17): solve, verify and draw.
+CAGES := random_03 random_05 random_09 t_wall hourglass_wall t_grippers m_grippers hourglass_grippers \
+	hooks_3 hooks_4 hourglass_min hourglass_max m_min m_tripod t_tripod
+figures: setup
+	@mkdir -p build docs/gallery
+	@for name in $(CAGES); do echo "== $$name"; \
+		$(BIN)/python -m expert solve configs/problem/cage/$$name.yaml -o build/$$name.json || exit 1; \
+		$(BIN)/python -m expert verify build/$$name.json || exit 1; \
+		$(BIN)/python -m expert draw build/$$name.json -o docs/gallery/cage_$$name.png || exit 1; \
 	done
 
 clean:
