@@ -125,23 +125,51 @@ def test_the_report_needs_no_network(results: Path) -> None:
     assert page.count("<animate ") > 10
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to open the report in")
-def test_the_report_opens_in_a_browser(results: Path, tmp_path: Path) -> None:
+def browse(page: Path, profile: Path, *, width: int = 1200) -> str:
+    """The page as Chromium has it once scripts have run; it must not complain."""
     answer = subprocess.run(
         [
-            str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}",
-            "--enable-logging=stderr", "--virtual-time-budget=2000", "--dump-dom", f"file://{results / 'report.html'}",
+            str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}",
+            "--enable-logging=stderr", "--virtual-time-budget=2000", f"--window-size={width},900", "--dump-dom",
+            f"file://{page}",
         ],
         capture_output=True, text=True, timeout=120, check=True,
     )  # fmt: skip
     assert "CONSOLE" not in answer.stderr
+    return answer.stdout
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to open the report in")
+def test_the_report_opens_in_a_browser(results: Path, tmp_path: Path) -> None:
+    seen = browse(results / "report.html", tmp_path)
     models = 6
-    assert answer.stdout.count("<svg ") == 2 * models  # an example of the family and one of the test set
-    assert answer.stdout.count("<img ") == 2 + 2 * 2  # curves, whole motions; video and strip of each example
+    assert seen.count("<svg ") == 2 * models  # an example of the family and one of the test set
+    assert seen.count("<img ") == 2 + 2 * 2  # curves, whole motions; video and strip of each example
     assert (
-        answer.stdout.count("<table") == 1 + 6 + 1 + 4 + 1
+        seen.count("<table") == 1 + 6 + 1 + 4 + 1
     )  # Table 4.1, its details, order, tests by data set, origin
-    assert answer.stdout.rstrip().endswith("</html>")
+    assert seen.rstrip().endswith("</html>")
+
+
+MEASURE = """<script>
+const wide = [...document.querySelectorAll(".scroll")].filter(x => x.scrollWidth > x.clientWidth).length;
+const page = document.documentElement;
+document.title = `${wide} tables, page ${page.scrollWidth - page.clientWidth}`;
+</script>"""
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to open the report in")
+@pytest.mark.parametrize("width", [1200, 500])
+def test_the_report_fits_desks_and_telephones(results: Path, tmp_path: Path, width: int) -> None:
+    """On a desk no table is cut off; on a telephone tables scroll by themselves, never the page."""
+    page = tmp_path / "report.html"
+    page.write_text((results / "report.html").read_text().replace("</body>", MEASURE + "</body>"))
+    found = re.search(
+        r"<title>(\d+) tables, page (-?\d+)</title>", browse(page, tmp_path / "profile", width=width)
+    )
+    assert found is not None
+    assert int(found[2]) == 0
+    assert int(found[1]) == 0 or width < 1200
 
 
 def test_the_same_seeds_give_the_same_weights_side_by_side_and_after_a_kill(workplace: Path) -> None:

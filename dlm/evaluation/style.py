@@ -31,10 +31,10 @@ td.good { background: var(--good); } td.bad { background: var(--bad); }
 .words td { text-align: left; white-space: normal; vertical-align: top; } .words th { text-align: left; }
 .origin td { overflow-wrap: anywhere; } .origin td:first-child { white-space: nowrap; }
 .pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 34rem), 1fr)); gap: 0 1.5rem; }
-.pair > * { min-width: 0; } .pair th, .pair td { padding-inline: .5rem; }
+.pair > * { min-width: 0; } .pair th, .pair td { padding-inline: .42rem; }
 figure { margin: 1rem 0; } img.chart { display: block; max-width: 100%; height: auto; background: #fff; border-radius: 8px; border: 1px solid var(--line); padding: 6px; }
 .wide { overflow-x: auto; } .wide img.chart { min-width: 46rem; }
-.films { display: grid; grid-template-columns: repeat(auto-fill, minmax(9rem, 1fr)); gap: .7rem; align-items: end; }
+.films { display: grid; grid-template-columns: repeat(auto-fill, minmax(7.2rem, 1fr)); gap: .7rem; align-items: end; }
 .films figure { margin: 0; padding: .4rem; background: var(--card); border-radius: 8px; border: 1px solid var(--line); height: 100%; display: flex; flex-direction: column; justify-content: flex-end; }
 .films svg, .films img { width: 100%; height: auto; display: block; }
 .films figcaption { text-align: center; font-size: .82rem; padding-top: .3rem; }

@@ -202,7 +202,7 @@ DETAILS = {
     "within": "Share of tasks that end within 2 mm and 2°",
     "rms": "RMS error over the motion [mm, °]",
     "finger": "Finger-trajectory loss [cm²], against the expert's positions",
-    "drops": "Objects that end too low, dropped or never lifted, per seed (programs not solved)",
+    "drops": "Objects that end too low, dropped or never lifted, per seed (in brackets: programs not solved)",
 }
 
 
@@ -220,7 +220,7 @@ def _detail(cell: Cell, kind: str) -> str:
         "within": f"{cell.within:.3f}",
         "rms": f"{_short(cell.rms_mm)}, {_short(cell.rms_deg)}",
         "finger": "–" if cell.finger_loss is None else _number(cell.finger_loss),
-        "drops": f"{drops:g} of {cell.tasks} ({unsolved:g})",
+        "drops": f"{drops:g} of {cell.tasks}" + (f" ({unsolved:g})" if unsolved else ""),
     }[kind]
 
 

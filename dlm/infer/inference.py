@@ -14,7 +14,8 @@ from dlm.infer.view import View, find_floor, lowest_row, view_of
 from dlm.perception import Perceived, PerceptionSettings, perceive
 from dlm.simulator import SimulatorSettings
 from dlm.simulator.replay import Replay, replay
-from dlm.structured import ExpertPlanner, Planned, StructuredModel
+from dlm.structured import ClassPlanner, ExpertPlanner, Planned, StructuredModel
+from dlm.structured.trial import Trial
 from expert.errors import InvalidProblem
 from expert.files import problem_of
 from expert.files.contact_plan import answer_fields
@@ -24,6 +25,8 @@ from expert.types import ContactTask, Plan, require
 
 Refine = Literal["expert"]
 WITHIN_MM, WITHIN_DEG = 2.0, 2.0
+CODEC = 10.0
+"""Errors of usual compression near edges [grey levels]."""
 NEEDLESS = 0.15
 """Corners that change the outline by less are left out [pixels that perception is shown]."""
 UNKNOWN_SCALE = 1e-3
@@ -64,7 +67,8 @@ class Scene:
 class Inference:
     """Answer to a video.
 
-    status: planned, poor_fit (a plan, but what was seen does not explain the video well) or no_plan; reason: in words.
+    status: planned; risky (a plan that fails in some trials); poor_fit (a plan, but what was seen does not explain the video
+    well); no_plan.  reason: in words.
     result: the plan as it goes in the simulator, on the object as perceived; None without a plan.
     """
 
@@ -120,12 +124,13 @@ def infer(
 ) -> Inference:
     """Positions and forces of two point fingers that move the object of a video as the video shows.
 
-    model: how to plan; None: every contact class is checked, which needs no weights.  refine: "expert" lets the expert plan,
+    model: how to plan; None: every contact class is checked, which needs no weights, and plans are tried out in simulation.  refine: "expert" lets the expert plan,
     slower and over all contact sequences; without it, that happens only where the model finds no plan.  start, end [s], rate: see `read_clip`.
     Raises InvalidProblem, one line, for a video without one object that stays in view.
     """
     require(refine in (None, "expert"), "refine", "expert or nothing", refine)
-    model = model or StructuredModel()
+    model = model or StructuredModel(planner=ClassPlanner(trial=Trial()))
+    model = replace(model, perception=replace(model.perception, codec=CODEC))
     steps = model.planning.tasks.steps
     clip = (
         video if isinstance(video, Clip) else read_clip(video, steps=steps, start=start, end=end, rate=rate)
