@@ -42,7 +42,14 @@ def main(cfg: DictConfig) -> None:
     else:
         train_side_by_side(cfg, runs, stages)
     print(f"curves: tensorboard --logdir {folder(runs[0]) / 'tensorboard' if len(runs) == 1 else cfg.output}")
-    print(f"next: python evaluate.py output={cfg.output} seeds=[{','.join(map(str, seeds))}]")
+    print(f"next: {following(cfg, seeds)}")
+
+
+def following(cfg: DictConfig, seeds: Sequence[int]) -> str:
+    """The command that judges what was trained."""
+    if cfg.model.name == "structured":
+        return f"python -m tests.benchmarks.stages --output {cfg.output} --seed {seeds[0]}"
+    return f"python evaluate.py output={cfg.output} seeds=[{','.join(map(str, seeds))}]"
 
 
 def of_seed(cfg: DictConfig, seed: int) -> DictConfig:

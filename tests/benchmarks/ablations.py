@@ -25,7 +25,6 @@ import torch
 from rich.console import Console
 from rich.table import Table
 
-from datasets.disturb import DISTURBANCES
 from datasets.specification import Sample
 from datasets.store import read_dataset
 from dlm.evaluation.outcomes import Outcome, execute
@@ -42,7 +41,7 @@ from dlm.structured.policies import Perceiver, StructuredArchitecture, joined, u
 from dlm.structured.scorer import Scorer
 from dlm.tasks import TaskBatch
 from expert.errors import InvalidProblem
-from tests.benchmarks.structured import SEED, fresh
+from tests.benchmarks.structured import SEED, fresh, seen
 
 RIGID = SimulatorSettings()
 STEPS, BATCH, RATE = 1500, 32, 1e-3
@@ -54,7 +53,7 @@ def answers(model: StructuredModel, samples: Sequence[Sample], disturbance: str)
     """What the model plans for each video; None for refused ones."""
     found: list[Planned | None] = []
     for sample in samples:
-        video = DISTURBANCES[disturbance](sample.video, np.random.default_rng([sample.index, 17]))
+        video = seen(sample, disturbance)
         try:
             found.append(model.act(video))
         except InvalidProblem:
@@ -240,6 +239,20 @@ STUDIES: dict[str, Callable[[dict[str, list[Sample]], argparse.Namespace], list[
 }
 
 
+def write_extra(name: str, rows: list[Row], folder: Path) -> None:
+    """One table as `dlm.evaluation.extras` reads it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    doc = STUDIES[name].__doc__ or ""
+    table = {
+        "title": f"Structured model: {name}",
+        "caption": doc.strip(),
+        "command": f"python -m tests.benchmarks.ablations --only {name}",
+        "columns": list(rows[0]),
+        "rows": [[str(v) if isinstance(v, bool) else v for v in row.values()] for row in rows],
+    }
+    (folder / f"structured_{name}.json").write_text(json.dumps(table, indent=1))
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
@@ -251,6 +264,9 @@ def main() -> int:
     parser.add_argument("--data", type=Path, default=Path("data/large-seed0"), help="training tasks")
     parser.add_argument("--folder", type=Path, default=Path("data"), help="where the fresh tasks are kept")
     parser.add_argument("--json", type=Path)
+    parser.add_argument(
+        "--extras", type=Path, help="folder for tables that `evaluate.py extras=[...]` can show"
+    )
     options = parser.parse_args()
     if options.quick:
         options.tasks, options.steps = 12, 20
@@ -267,6 +283,8 @@ def main() -> int:
         for row in rows:
             table.add_row(*(f"{v:.3g}" if isinstance(v, float) else str(v) for v in row.values()))
         Console(width=120).print(table)
+        if options.extras:
+            write_extra(name, rows, options.extras)
         if options.json:
             options.json.write_text(json.dumps(results, indent=1, default=str))
     return 0

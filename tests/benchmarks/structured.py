@@ -25,6 +25,7 @@ from rich.table import Table
 
 from datasets.disturb import DISTURBANCES
 from datasets.generation import Generation, generate
+from datasets.render import Frames
 from datasets.shapes import Shapes
 from datasets.specification import Sample, Specification
 from datasets.store import read_dataset
@@ -103,9 +104,13 @@ class Records:
                 file.write(json.dumps(record) + "\n")
 
 
-def measure(model: StructuredModel, sample: Sample, disturbance: str) -> Record:
+def seen(sample: Sample, disturbance: str) -> Frames:
+    """Its video, disturbed; the same for all models."""
+    return DISTURBANCES[disturbance](sample.video, np.random.default_rng([sample.index, 17]))
+
+
+def measure(model: StructuredModel, sample: Sample, video: Frames) -> Record:
     """One video through the model and the simulator."""
-    video = DISTURBANCES[disturbance](sample.video, np.random.default_rng([sample.index, 17]))
     start = time.process_time()
     try:
         planned, reason = model.act(video), ""
@@ -207,7 +212,7 @@ def rows_of(
 
 def _result(name: str, model: StructuredModel | None, sample: Sample, disturbance: str) -> Record:
     if model is not None:
-        return measure(model, sample, disturbance)
+        return measure(model, sample, seen(sample, disturbance))
     own = executed(FIXED[name](TaskBatch.of([sample])), sample)
     return {**own, "status": "planned", "reason": "", "checked": 0, "seconds": 0.0, "cause": ""}
 
