@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expert.errors import ExpertError
+from expert.errors import SolverFailed
 from expert.geometry.polygon import signed_distance
 from expert.geometry.pose import Array, rotation
 from expert.verify.event_kernel import COLUMNS, TOUCH, closing_contacts
@@ -33,11 +33,15 @@ class DeadEndEvent:
         """So many configurations (count, 3) from the first to the last."""
         return self.first + np.linspace(0, 1, count)[:, None] * (self.last - self.first)
 
+    def inner_configurations(self, count: int) -> Array:
+        """So many configurations (count, 3) between the first and the last; at these a finger may slip round a corner."""
+        return self.configurations(count + 2)[1:-1]
+
 
 def dead_end_events(path: FingerPath) -> list[DeadEndEvent]:
     """All dead ends along a finger path but the goal itself, reachable or not, in order of s.
 
-    Raises ExpertError where there are more than can be listed.
+    Raises SolverFailed where there are more than can be listed.
     """
     contacts, rows = _closing(path)
     free = [(row, interval) for row in rows for interval in _free_intervals(path, row)]
@@ -59,7 +63,7 @@ def _closing(path: FingerPath) -> tuple[np.ndarray, Array]:
         np.ascontiguousarray(path.knots), events,
     )  # fmt: skip
     if found == MOST:
-        raise ExpertError(f"more than {MOST} dead ends: the finger path is degenerate")
+        raise SolverFailed(f"more than {MOST} dead ends: the finger path is degenerate")
     return contacts, events[:found]
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import shapely
 from scipy.optimize import linprog
 
+from expert.errors import SolverFailed
 from expert.geometry.pose import Array, cross
 from expert.verify.finger_path import Facets
 
@@ -119,26 +120,21 @@ def _positively_span(normals: Array) -> bool:
 def observability_rank(gradients: Array) -> int:
     """Rank of the proprioceptive sensor model (Thesis 5.2.4) with gap gradients (C, 3).
 
-    Sensor i answers to first order with g_i . dq where that is negative (the gap closes) and with 0 otherwise.  The rank
-    is 3 less the dimension of the span of the motions dq to which no sensor answers.
+    Sensor i answers to first order with g_i . dq where that is negative (the gap closes), and with 0 otherwise.  Motions
+    without any answer form the cone g_i . dq >= 0; the rank is 3 less the dimension that it spans.  That is the rank of
+    the gradients which vanish on all of the cone: one linear program finds a motion that opens every gap that can open.
     """
-    unseen = np.zeros((0, 3))
-    while len(unseen) < 3:
-        rest = np.linalg.svd(np.vstack([unseen, np.zeros((1, 3))]))[2][len(unseen) :]
-        motion = _unseen_motion(gradients, rest)
-        if motion is None:
-            break
-        unseen = np.vstack([unseen, motion])
-    return 3 - len(unseen)
-
-
-def _unseen_motion(gradients: Array, directions: Array) -> Array | None:
-    """A motion that closes no gap and has a part along one of the directions, or None."""
-    for direction in (*directions, *(-directions)):
-        answer = linprog(-direction, A_ub=-gradients, b_ub=np.zeros(len(gradients)), bounds=[(-1, 1)] * 3)
-        if answer.status == 0 and -answer.fun > LEAST:
-            return np.asarray(answer.x)
-    return None
+    count = len(gradients)
+    if count == 0:
+        return 0
+    opening = np.hstack([-gradients, np.eye(count)])  # opening_i <= g_i . dq
+    cost = np.append(np.zeros(3), -np.ones(count))
+    bounds = [(-1 / LEAST, 1 / LEAST)] * 3 + [(0, 1)] * count
+    answer = linprog(cost, A_ub=opening, b_ub=np.zeros(count), bounds=bounds)
+    if answer.status != 0:
+        raise SolverFailed(f"linear program of the observability rank: {answer.message}")
+    fixed = gradients[answer.x[3:] < 0.5]
+    return int(np.linalg.matrix_rank(fixed, tol=LEAST)) if len(fixed) else 0
 
 
 def gap_gradients(facets: Facets, fingers: Array, contacts: Contacts) -> Array:

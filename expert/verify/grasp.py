@@ -20,7 +20,7 @@ from functools import partial
 import numpy as np
 
 from expert.caging.problem import START_TOLERANCE
-from expert.errors import InvalidProblem
+from expert.errors import InvalidProblem, SolverFailed
 from expert.geometry.pose import Array
 from expert.grasping.problem import GraspProblem, GraspSolution
 from expert.types import readonly
@@ -38,12 +38,14 @@ from expert.verify.end_grasp import (
 from expert.verify.event_kernel import TOUCH
 from expert.verify.finger_path import FingerPath
 from expert.verify.grasp_report import Cages, DeadEnd, DeadEnds, EndGrasp, GraspReport, Verdict
-from expert.verify.reach_tube import Tube, reach_tube, settled_slab
+from expert.verify.reach_tube import COARSEST, Tube, reach_tube, settled_slab
 from expert.verify.slab import uniform_ring
 from expert.verify.start_set import StartSet
 
 SPREAD = np.radians(10)
 """What can be reached may leave the first half-range by this before it counts as leaking."""
+ROUNDS = 3
+"""What can be reached is computed with cells so often a quarter as wide, while that may yet exclude a dead end."""
 
 
 def verify(task: GraspProblem, answer: GraspSolution | None = None) -> GraspReport:
@@ -66,18 +68,17 @@ def verify_grasp(
     facets: Sequence[int] = (),
     *,
     full: bool = True,
-    rounds: int = 4,
     time_limit: float = 20.0,
 ) -> GraspReport:
     """Decide whether fingers along straight lines between knots (K, N, 2) [m] bring all of Q0 to the goal.
 
     facets: the one that each finger claims to touch in the end; empty: no claim.  full: report on all parts although one
-    has failed.  rounds: refinements of what can be reached; time_limit [s]: processor time for it.
+    has failed.  time_limit [s]: processor time for what can be reached.
     Raises InvalidProblem for a path that does not fit the problem.
     """
     knots = readonly(path, (len(problem.half_ranges), problem.count, 2), "fingers.path")
     check = _Check(problem, FingerPath(problem.shape, problem.pose, knots), tuple(facets))
-    return check.run(full, rounds, time_limit)
+    return check.run(full, time_limit)
 
 
 class _Check:
@@ -94,9 +95,9 @@ class _Check:
         self.dead_ends: DeadEnds | None = None
         self.isolation = NOT_ISOLATED
 
-    def run(self, full: bool, rounds: int, time_limit: float) -> GraspReport:
+    def run(self, full: bool, time_limit: float) -> GraspReport:
         """All parts; unless `full`, only up to the first that fails."""
-        jams = partial(self.check_dead_ends, rounds, time_limit)
+        jams = partial(self.check_dead_ends, time_limit)
         steps: dict[str, Callable[[], None]] = {
             "path": self.check_path,
             "end": self.check_end,
@@ -163,20 +164,33 @@ class _Check:
         """Q0."""
         self.start = StartSet(self.path)
 
-    def check_dead_ends(self, rounds: int, time_limit: float) -> None:
+    def check_dead_ends(self, time_limit: float) -> None:
         """What can be reached from Q0 stays bounded, meets no dead end, and is the goal alone in the end."""
-        events = dead_end_events(self.path)
+        try:
+            events = dead_end_events(self.path)
+        except SolverFailed as error:
+            self.doubts.append(str(error))
+            return
         deadline = time.process_time() + time_limit
-        tube = reach_tube(self.path, float(self.problem.half_ranges[0] + SPREAD), deadline)
-        jams = [self._dead_end(e) for e in events if tube.meets(e.s, e.first, e.last)]
-        alone = tube.closed and self._alone(tube)
+        limit = float(self.problem.half_ranges[0] + SPREAD)
+        tube = Tube(leak=(0.0, 0.0))
+        for coarsest in (COARSEST >> (2 * k) for k in range(ROUNDS)):
+            finer = reach_tube(self.path, limit, coarsest, deadline)
+            if tube.closed and not finer.closed:
+                break  # no time: the coarse answer stands
+            tube = finer
+            jams = [self._dead_end(e) for e in events if tube.meets(e.s, e.first, e.last)]
+            alone = tube.closed and self._alone(tube)
+            sure = any(jam.witness is not None for jam in jams)
+            if sure or not tube.closed or (alone and not jams):
+                break
         self._record(tube, jams, len(events), alone)
         self._conclude(tube, jams, alone)
 
     def _record(self, tube: Tube, jams: list[DeadEnd], listed: int, alone: bool) -> None:
-        assert_cages = self.cages or Cages(half_ranges=self.problem.half_ranges, knot_ranges=np.empty((0, 2)))
+        unknown = np.full((len(self.path.knots), 2), np.nan)
         self.cages = replace(
-            assert_cages,
+            self.cages or Cages(half_ranges=self.problem.half_ranges, knot_ranges=unknown),
             samples=np.array([(slab.low, slab.high) for slab in tube.slabs]).reshape(-1, 2),
             ranges=np.array([slab.range for slab in tube.slabs]).reshape(-1, 2),
             leak=tube.leak,
@@ -210,7 +224,7 @@ class _Check:
         return last is not None and self.isolation.holds_in(last.shift, *last.range)
 
     def _dead_end(self, event: DeadEndEvent) -> DeadEnd:
-        places = event.configurations(9)
+        places = event.inner_configurations(9)
         poses = self.path.frame.world_pose(places)
         untouched = self.path.deepest(places, 0.0, event.s) <= TOUCH
         known = self.start.contains(poses) if self.start else np.zeros(len(poses), bool)

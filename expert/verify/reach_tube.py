@@ -7,6 +7,7 @@ are halved, and when they are no coarser than the fingers' motion, the slab is.
 import time
 from dataclasses import dataclass, field
 
+import numpy as np
 import shapely
 
 from expert.geometry.pose import Array
@@ -16,7 +17,7 @@ from expert.verify.finger_path import FingerPath
 from expert.verify.slab import Reached, Slab, SlabFlood, coarsened, uniform_ring
 
 COARSEST = 64
-"""Width of the widest cells, in units of the cage verifier: 4 degrees."""
+"""Width of the widest cells that are of use, in units of the cage verifier: 4 degrees."""
 LEAST_SLACK = 1e-5
 """Slabs in which fingers move by less than twice this relative length are not halved."""
 NEAR_GOAL: Reached = {Cell(0, 1): [shapely.Point(0, 0)], Cell(TURN - 1, 1): [shapely.Point(0, 0)]}
@@ -43,30 +44,33 @@ class Tube:
         )
 
 
-def reach_tube(path: FingerPath, limit: float, deadline: float) -> Tube:
+def reach_tube(path: FingerPath, limit: float, coarsest: int, deadline: float) -> Tube:
     """Flood from the goal's component at s = 0 to the end; orientations beyond the limit [rad] count as escaped.
 
+    coarsest: width of the widest cells, in units of the cage verifier; below COARSEST fingers move by no more in a slab.
     deadline: processor time at which to give up.
     """
     tube = Tube()
-    first = settled_slab(path, 0.0, 0.0, uniform_ring(COARSEST), NEAR_GOAL, limit)
+    longest = 2 * coarsest * UNIT if coarsest < COARSEST else np.inf
+    first = settled_slab(path, 0.0, 0.0, uniform_ring(coarsest), NEAR_GOAL, limit)
     if first is None:
         tube.leak = 0.0, 0.0
         return tube
     sources, ring, s = first.reached, first.ring, 0.0
     stride = 16 * UNIT * min(cell.width for cell in ring) / max(_motion(path, 0.0, 1.0), LEAST_SLACK)
     while s < path.last:
-        to_knot = int(s) + 1 - s
-        high = s + stride if stride < 0.999 * to_knot else float(int(s) + 1)
+        knot = float(int(s) + 1)
+        stride = min(stride, longest / max(_motion(path, knot - 1, knot), LEAST_SLACK))
+        high = s + stride if stride < 0.999 * (knot - s) else knot
         slab = settled_slab(path, s, high, ring, sources, limit)
         if slab is None:
             stride = 0.5 * (high - s)
-            if _motion(path, s, high) < 2 * LEAST_SLACK or time.process_time() > deadline:
-                tube.leak = s, high
-                return tube
-            continue
-        tube.slabs.append(slab)
-        sources, ring, s, stride = slab.reached, coarsened(slab.ring, COARSEST), high, 2 * (high - s)
+        if time.process_time() > deadline or (slab is None and _motion(path, s, high) < 2 * LEAST_SLACK):
+            tube.leak = s, high
+            return tube
+        if slab is not None:
+            tube.slabs.append(slab)
+            sources, ring, s, stride = slab.reached, coarsened(slab.ring, coarsest), high, 2 * (high - s)
     return tube
 
 
