@@ -211,6 +211,10 @@ class CageProblem:
             require(fits, "options.rotation", "ranges around the pose, each side between 0 and 180 deg", got)
         if self.cost not in ("none", "min_separation", "max_opening"):
             raise InvalidProblem("cost", expected="none, min_separation or max_opening", got=str(self.cost))
+        if self.cost == "max_opening":
+            fits = self.count in (2, 3) and not self.fewest
+            got = f"{self.count} fingers" + (" or fewer" if self.fewest else "")
+            require(fits, "cost", "max_opening with 2 or 3 searched fingers", got, "choose another cost")
 
     def arrangement(self, fingers: Array) -> Arrangement:
         """The object among searched fingers (count, 2), fixed fingers and walls."""

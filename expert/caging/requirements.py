@@ -6,7 +6,6 @@ from expert.caging.frame import Frame
 from expert.caging.model import SweptModel
 from expert.caging.problem import CageProblem, Gripper
 from expert.caging.swept import REACH
-from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, rotation
 from expert.mip.backends import Solver
 from expert.mip.linear import Term
@@ -104,19 +103,12 @@ def _opening(model: SweptModel, count: int, to_relative: Array, best: float) -> 
         axis = to_relative @ np.array([1.0, 0.0])
         ends = [(axis, model.finger(1)), (-axis, model.finger(0))]
         model.milp.equal([*ends, (-1.0, alpha)], 0.0)
-    elif count == 3:
+    else:
         centre = model.milp.add((2,), -REACH, REACH)
         for k in range(3):
             u = to_relative @ TRIPOD[k]
             terms = [(1.0, model.finger(k)), (-1.0, centre), (-u, np.repeat(alpha, 2))]
             model.milp.equal(terms, np.zeros(2))
-    else:
-        raise InvalidProblem(
-            "cost",
-            expected="max_opening with 2 or 3 fingers",
-            got=f"{count} fingers",
-            remedy="choose another cost",
-        )
     model.milp.minimise([(-1.0, alpha)])
 
 
