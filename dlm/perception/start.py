@@ -119,6 +119,7 @@ def _turns(before: Array, after: Array) -> Array:
 
 
 def _likely(turns: Array, nearest: float) -> Array:
+    """The best of the turns, which comes first, and those next to the angle `nearest`."""
     distance = np.abs(np.mod(turns - nearest + np.pi, 2 * np.pi) - np.pi)
     return turns[np.unique([0, *np.argsort(distance)[:NEAREST]])]
 
