@@ -7,7 +7,7 @@ all where walls, fixed fingers, grippers or a cost take part.
 import itertools
 import time
 from collections.abc import Iterator
-from dataclasses import astuple, dataclass, field, replace
+from dataclasses import astuple, dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,16 +18,16 @@ from expert.caging.immobilise import candidates
 from expert.caging.model import SweptModel
 from expert.caging.polish import STEPS, improvements
 from expert.caging.problem import Arrangement, CageProblem
-from expert.caging.requirements import objective, require
+from expert.caging.requirements import require
 from expert.caging.rings import break_symmetry, hubs, labelled, rings
-from expert.caging.solution import CageSolution, CageStatus, Meeting
+from expert.caging.solution import CageSolution, CageStatus
 from expert.caging.swept import SweptGeometry
+from expert.caging.tally import Tally
 from expert.caging.thesis import ThesisModel, slices
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, to_world
 from expert.mip.backends import Solver
-from expert.verify.cage import CageReport, verify_cage
-from expert.verify.cage_claims import unmet_claim
+from expert.verify.cage import verify_cage
 
 Method = Literal["swept", "model", "thesis"]
 """swept: the model, and immobilising grasps where it is slow; model: the model alone; thesis: MIP1."""
@@ -65,55 +65,6 @@ class Attempt:
     seconds: float
 
 
-@dataclass
-class Tally:
-    """What happened so far, and the best verified answer."""
-
-    problem: CageProblem
-    deadline: float
-    attempts: int = 0
-    refuted: int = 0
-    unconfirmed: int = 0
-    exhausted: dict[tuple[object, ...], bool] = field(default_factory=dict)
-    """Whether each model tried is proved to have no (more) solutions.  A better answer to beat does not give it any."""
-    best: CageSolution = field(default_factory=lambda: CageSolution(status="none_found"))
-
-    @property
-    def left(self) -> float:
-        """Processor time that is left [s]: what is found does not depend on the machine's load."""
-        return self.deadline - time.thread_time()
-
-    @property
-    def done(self) -> bool:
-        """Whether a better answer cannot be found: there is one, and no cost."""
-        return self.best.found and self.problem.cost == "none"
-
-    def judge(self, fingers: Array) -> CageReport | None:
-        """Verify a model's fingers (count, 2) [m] and count.  None where they do not even fit beside the object."""
-        try:
-            report = verify_cage(self.problem.arrangement(fingers))
-        except InvalidProblem:
-            self.refuted += 1
-            return None
-        self.refuted += report.verdict == "escapes"
-        self.unconfirmed += report.verdict == "unknown"
-        return report
-
-    def keep(self, fingers: Array, report: CageReport, topology: tuple[Meeting, ...] = ()) -> None:
-        """Remember a verified cage if it is the best so far and keeps what else was asked for."""
-        found = CageSolution(
-            status="caged",
-            fingers=fingers,
-            rotation_range=report.rotation_range,
-            topology=topology,
-            objective=objective(self.problem, fingers),
-        )
-        if unmet_claim(self.problem, found):
-            self.refuted += 1
-        elif not self.best.found or found.objective < self.best.objective:
-            self.best = found
-
-
 def solve(
     problem: CageProblem | Arrangement,
     *,
@@ -140,7 +91,7 @@ def solve(
         _search_slices(tally, solver)
     else:
         _search_ranges(tally, method, solver)
-    return _answer(tally, time.thread_time() - began)
+    return tally.answer(time.thread_time() - began)
 
 
 def _fewest(problem: CageProblem, time_limit: float, method: Method, solver: Solver) -> CageSolution:
@@ -213,25 +164,6 @@ def _judge_fixed(tally: Tally) -> None:
         tally.keep(np.empty((0, 2)), report)
 
 
-def _answer(tally: Tally, seconds: float) -> CageSolution:
-    best = tally.best
-    if not best.found:
-        stopped = tally.left <= 0 or not all(tally.exhausted.values())
-        reason = (
-            "the time limit was reached before any cage was verified"
-            if stopped
-            else "no cage of the kind searched for within the rotation ranges tried; others may exist"
-        )
-        best = CageSolution(status="time_limit" if stopped else "none_found", reason=reason)
-    return replace(
-        best,
-        seconds=seconds,
-        attempts=tally.attempts,
-        refuted=tally.refuted,
-        unconfirmed=tally.unconfirmed,
-    )
-
-
 def _attempts(problem: CageProblem, method: Method) -> Iterator[Attempt | None]:
     """A quick model, grasps (None), more quick models, then models of growing size and time."""
     plain = problem.cost == "none" and not _restricted(problem)
@@ -298,13 +230,13 @@ def _grasps(problem: CageProblem, rng: np.random.Generator) -> Iterator[Array]:
     """Fingers (count, 2) in the body frame, close to where they hold the object."""
     tripod = problem.cost == "max_opening" and problem.count == 3
     if _restricted(problem) or tripod:
-        yield from Closures(problem).candidates(rng)
+        grasps = Closures(problem).candidates(rng)
     else:
-        for fingers in candidates(problem.shape.vertices, problem.count, problem.shape.size, rng):
-            across = to_world(problem.pose, fingers)[:, 0]
-            yield (
-                fingers[np.argsort(across)] if problem.cost == "max_opening" else fingers
-            )  # they open along x
+        grasps = candidates(problem.shape.vertices, problem.count, problem.shape.size, rng)
+    for fingers in grasps:
+        alike = problem.cost == "max_opening" and problem.count == 2 and not problem.grippers
+        order = np.argsort(to_world(problem.pose, fingers)[:, 0])  # they open along x
+        yield fingers[order] if alike else fingers
 
 
 def _try_models(tally: Tally, attempt: Attempt, solver: Solver) -> None:

@@ -10,7 +10,8 @@ from expert.caging.frame import Frame
 from expert.caging.model import Proposal
 from expert.caging.problem import CageProblem, Gripper, Shape
 from expert.caging.shapes import named_shape, random_polygon
-from expert.caging.synthesis import Tally, solve
+from expert.caging.synthesis import solve
+from expert.caging.tally import Tally
 from expert.caging.thesis import ThesisModel, slices
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
