@@ -44,7 +44,9 @@ def test_fingers_that_keep_a_side_to_side_grip_make_no_dead_end() -> None:
 
 
 def test_three_fingers_close_on_a_triangle_where_its_normals_meet() -> None:
-    corners = 2 * np.column_stack([np.cos(a := np.pi * np.array([1 / 6, 5 / 6, 3 / 2])), np.sin(a)])  # inradius 1
+    corners = 2 * np.column_stack(
+        [np.cos(a := np.pi * np.array([1 / 6, 5 / 6, 3 / 2])), np.sin(a)]
+    )  # inradius 1
     toward = np.column_stack([np.cos(a := np.pi * np.array([1 / 2, 7 / 6, 11 / 6])), np.sin(a)])
     knots = np.array([[3 * toward], [0.5 * toward]])[:, 0]
     events = dead_end_events(path_of(corners, knots, np.array([0.3, 0, 0.1])))
@@ -55,10 +57,14 @@ def test_three_fingers_close_on_a_triangle_where_its_normals_meet() -> None:
 def test_a_finger_in_a_reflex_corner_counts_as_two_contacts() -> None:
     notched = np.array([[-2.0, -1], [2, -1], [2, 1], [0.5, 1], [0, 0], [-0.5, 1], [-2, 1]])
     knots = [[[0.0, 2.0], [0.0, -2.0]], [[0.0, 0.2], [0.0, -0.2]]]
-    pushed_in = [e for e in dead_end_events(path_of(notched, knots, np.array([5.0, 5, 0]))) if len(e.contacts) == 3]
+    pushed_in = [
+        e for e in dead_end_events(path_of(notched, knots, np.array([5.0, 5, 0]))) if len(e.contacts) == 3
+    ]
     fingers = {tuple(sorted(f for f, _ in e.contacts)) for e in pushed_in}
     assert fingers == {(0, 0, 1), (0, 1, 1)}
-    assert [e.s for e in pushed_in] == pytest.approx([(4 - 1) / 3.6] * 2, abs=1e-9)  # the corner is 1 above the base
+    assert [e.s for e in pushed_in] == pytest.approx(
+        [(4 - 1) / 3.6] * 2, abs=1e-9
+    )  # the corner is 1 above the base
 
 
 def test_parallel_contacts_close_where_two_push_against_one() -> None:
@@ -72,7 +78,8 @@ def test_parallel_contacts_close_where_two_push_against_one() -> None:
 
 
 @pytest.mark.parametrize(
-    ("roots", "inside"), [((0.2, 0.7, 2.0, -1.0), [0.2, 0.7]), ((0.4, 0.4, 3.0, 5.0), [0.4]), ((0.0, 1.0), [0, 1])]
+    ("roots", "inside"),
+    [((0.2, 0.7, 2.0, -1.0), [0.2, 0.7]), ((0.4, 0.4, 3.0, 5.0), [0.4]), ((0.0, 1.0), [0, 1])],
 )
 def test_roots_in_the_unit_interval_are_found(roots: tuple[float, ...], inside: list[float]) -> None:
     coefficients = np.polynomial.polynomial.polyfromroots(roots)
