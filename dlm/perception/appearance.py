@@ -6,25 +6,20 @@ import numpy as np
 from scipy import ndimage
 
 from datasets.render import Camera, Frames, ground_coverage
+from dlm.perception.background import background_of
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import NDArrayBool
 from expert.geometry.pose import Array
 
-LEAST_NOISE = 0.5
-"""Standard deviation that is assumed of a pixel at least [grey levels]: it is rounded."""
 MODEL_ERROR = 0.004
 """Standard deviation of what no exact coverage explains, the renderer's own errors among it [share of a pixel]."""
 FOREIGN = 25.0
 """A colour this far from every mixture of object and background is something else [grey levels]."""
-PURE = 1e-3
-"""A pixel with less of the ground shows the wall alone."""
 FAINTEST = 12.0
 """Colours differ from this distance on [grey levels]."""
 FEWEST = 8
 """Pixels that tell the object's colour."""
 CROSS = np.array([[[0, 1, 0], [1, 1, 1], [0, 1, 0]]])
-EVERY = 6
-"""Of so many pixels one tells of background and lighting."""
 
 
 @dataclass(frozen=True)
@@ -52,13 +47,13 @@ def separate(video: Frames, camera: Camera, floor: bool, blur: float = 0.0, code
     ground = ground_coverage(camera)[::-1] if floor else np.zeros((camera.size, camera.size))
     if blur > 0:
         ground = ndimage.gaussian_filter1d(ground, blur, axis=0, mode="nearest")
-    light, wall, background, plain_noise = _background(images, ground)
-    noise = float(np.hypot(plain_noise, codec))
+    behind = background_of(images, ground)
+    light, noise = behind.light, float(np.hypot(behind.noise, codec))
     plain = images / light[..., None]
-    line = _object_colour(plain, background, noise, blur) - wall
+    line = _object_colour(plain, behind.image, noise, blur) - behind.wall
     length = float(line @ line)
-    share = ((plain - background) * line).sum(axis=-1) / length
-    off = np.linalg.norm(plain - background - share[..., None] * line, axis=-1) * light
+    share = ((plain - behind.image) * line).sum(axis=-1) / length
+    off = np.linalg.norm(plain - behind.image - share[..., None] * line, axis=-1) * light
     contrast = light * length**0.5
     precision = 1 / ((noise / contrast) ** 2 + MODEL_ERROR**2)
     foreign = (off > max(6 * noise, FOREIGN)) | _half_covered_areas(share, noise / contrast)
@@ -74,52 +69,6 @@ def _half_covered_areas(share: Array, deviation: Array) -> NDArrayBool:
     flat = highest - lowest < 0.1 + 5 * deviation
     odd = flat & (np.abs(mean - np.clip(np.rint(mean), 0, 1)) > 0.12 + deviation)
     return np.asarray(ndimage.binary_dilation(odd, np.ones((1, 3, 3))))
-
-
-def _background(images: Array, ground: Array) -> tuple[Array, Array, Array, float]:
-    """Lighting (h, w) around 1, under even light colours of the wall (3,) and of wall and ground (h, w, 3), noise.
-
-    Brightness is lighting times the colour of the wall or the ground: its logarithm is a sum, fitted robustly to
-    pixels of either; what is neither (the object, something in front) differs in hue or brightness and is left out.
-    """
-    basis = _smooth_basis(*ground.shape)
-    regions = np.stack([region for region in (ground < PURE, ground > 1 - PURE) if region.any()], axis=-1)
-    count = regions.shape[-1]
-    design = np.concatenate([regions.astype(float), basis], axis=-1)
-    y, x = np.indices(ground.shape)
-    known = np.broadcast_to(np.any(regions, axis=-1) & ((x + 2 * y) % EVERY == 0), images.shape[:3])
-    sample, where = images[known], np.broadcast_to(design, (*known.shape, design.shape[-1]))[known]
-    region = where[:, :count].argmax(axis=-1)
-    brightness = np.maximum(sample.sum(axis=-1), 1.0)
-    hue: Array = sample / brightness[:, None]
-    typical = np.array([np.median(hue[region == k], axis=0) for k in range(count)])
-    tinted = np.linalg.norm(hue - typical[region], axis=-1) * brightness
-    inside = tinted < 3 * np.median(tinted) + 3
-    level = np.array([np.median(brightness[region == k]) for k in range(count)])
-    rest = np.log(brightness) - np.log(level[region])
-    for _ in range(6):
-        spread = 1.4826 * np.median(np.abs(rest[inside]))
-        near = inside & (np.abs(rest) < 2.5 * spread + 3 / brightness)
-        weight = np.where(near, brightness**2, 0)
-        weight /= weight.max()
-        matrix = where.T @ (weight[:, None] * where) + 1e-6 * np.eye(design.shape[-1])
-        surface = np.linalg.solve(matrix, where.T @ (weight * np.log(brightness)))
-        rest = np.log(brightness) - where @ surface
-    light = np.exp(np.clip(basis @ surface[count:], -1.5, 1.5))
-    even = sample / np.broadcast_to(light, known.shape)[known][:, None]
-    colours = [np.median(even[near & (region == k)], axis=0) for k in range(count)]
-    background = colours[0] + ground[..., None] * (colours[-1] - colours[0])
-    off = (
-        sample - (even * 0 + np.array(colours)[region]) * np.broadcast_to(light, known.shape)[known][:, None]
-    )[near]
-    noise = 1.4826 * float(np.median(np.abs(off - np.median(off, axis=0))))
-    return light, colours[0], background, max(noise, LEAST_NOISE)
-
-
-def _smooth_basis(height: int, width: int) -> Array:
-    """Polynomials of second degree over the image without the constant, (h, w, 5)."""
-    y, x = np.meshgrid(np.linspace(-1, 1, height), np.linspace(-1, 1, width), indexing="ij")
-    return np.stack([x, y, x * x, x * y, y * y], axis=-1)
 
 
 def _object_colour(plain: Array, background: Array, noise: float, blur: float) -> Array:
