@@ -70,8 +70,8 @@ class Closures:
         sites = self._sites(clearance)
         held = [k for gripper in problem.grippers for k in gripper.fingers]
         alone = [k for k in range(problem.count) if k not in held]
-        if len(set(held)) < len(held):
-            return []  # fingers shared by grippers
+        if problem.count == 0 or len(set(held)) < len(held):
+            return []  # nothing to place, or fingers shared by grippers
         units = [self._held(gripper, sites, direction, clearance) for gripper in problem.grippers]
         units += [self._placed(sites[:, None], clearance)] * len(alone)
         if any(not len(unit.fingers) for unit in units):
