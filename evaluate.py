@@ -19,9 +19,10 @@ from dlm.checkpoint import About, load, restore_weights
 from dlm.evaluation.baselines import unlearned
 from dlm.evaluation.extras import read_extras
 from dlm.evaluation.report import png
+from dlm.evaluation.settle import settle
 from dlm.evaluation.study import Study, Trained
 from dlm.models import Policy
-from dlm.tasks import read_all
+from dlm.tasks import TaskBatch, read_all
 from dlm.training import Stage
 from expert.types import require
 
@@ -32,10 +33,12 @@ STAGES = ("nn", "nnm", "mdr", "cvx", "dlm")
 def main(cfg: DictConfig) -> None:
     """Rebuild every policy from its checkpoint, execute its actions, write tables and report."""
     require(len(cfg.seeds) > 0, "seeds", "at least one seed", list(cfg.seeds), "seeds=[0]")
+    known = ("running", "settled")
+    require(cfg.batch_norm in known, "batch_norm", " or ".join(known), cfg.batch_norm)
     torch.set_num_threads(1)
     tasks, extras = read_all(cfg.data), read_extras(cfg.extras)
     study = Study(
-        trained=[trained(cfg, name) for name in STAGES],
+        trained=[trained(cfg, name, tasks) for name in STAGES],
         tasks=tasks,
         simulator=instantiate(cfg.simulator, _convert_="object"),
         baselines=unlearned() if cfg.perceived else {},
@@ -47,7 +50,7 @@ def main(cfg: DictConfig) -> None:
         status.update("drawing")
         report = study.report(outcomes, table, examples=cfg.examples, extras=extras)
         page = report.html()
-    folder = Path(cfg.output)
+    folder = Path(cfg.results or cfg.output)
     files = {
         "table_4_1.md": table.as_markdown().encode(),
         "table_4_1.csv": table.as_csv().encode(),
@@ -62,9 +65,12 @@ def main(cfg: DictConfig) -> None:
     print(f"report: {(folder / 'report.html').resolve()}")
 
 
-def trained(cfg: DictConfig, name: str) -> Trained:
+def trained(cfg: DictConfig, name: str, tasks: dict[str, TaskBatch]) -> Trained:
     """One architecture with the policies of all seeds."""
     loaded = [load_policy(Path(cfg.output), name, seed) for seed in cfg.seeds]
+    if cfg.batch_norm == "settled":
+        for stage, policy, _ in loaded:
+            settle(policy, tasks[stage.dataset])
     return Trained(
         stage=loaded[0][0], policies=[policy for _, policy, _ in loaded], abouts=[a for *_, a in loaded]
     )

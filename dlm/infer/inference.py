@@ -27,6 +27,8 @@ Refine = Literal["expert"]
 WITHIN_MM, WITHIN_DEG = 2.0, 2.0
 CODEC = 10.0
 """Errors of usual compression near edges [grey levels]."""
+EXTENTS = (28.0, 24.0, 34.0)
+"""Of the object in what perception is shown, where the video has as many pixels; others are tried where the first fits badly."""
 NEEDLESS = 0.15
 """Corners that change the outline by less are left out [pixels that perception is shown]."""
 UNKNOWN_SCALE = 1e-3
@@ -157,8 +159,16 @@ def look(
     if floor is None:
         floor = lowest_row(segmentation.paint(clip.frames, float(clip.frames.shape[1])))
     frames = segmentation.paint(clip.frames, floor)
-    view = view_of(frames, scale=scene.scale or UNKNOWN_SCALE, floor=floor)
-    seen = simplified(perceive(view.frames, view.camera, settings), NEEDLESS * view.camera.scale)
+    scale = scene.scale or UNKNOWN_SCALE
+    tried = []
+    for extent in EXTENTS:
+        view = view_of(frames, scale=scale, floor=floor, extent=extent)
+        seen = perceive(view.frames, view.camera, settings)
+        tried.append((seen.status != "ok", seen.residual, len(tried), view, seen))
+        if seen.status == "ok":
+            break
+    *_, view, seen = min(tried)
+    seen = simplified(seen, NEEDLESS * view.camera.scale)
     if scene.object_size is None:
         return view, seen
     factor = scene.object_size / diameter(seen.vertices)

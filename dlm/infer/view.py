@@ -14,8 +14,6 @@ from expert.types import require
 
 COARSE = 96
 """Side of the picture in which the object is looked for [pixels]."""
-ENOUGH = 28.0
-"""Extent that the object has in what perception is shown, where the video has that many pixels or more."""
 AROUND = 6.0
 """Kept around the object's motion [pixels of that]."""
 VISIBLE = 12.0
@@ -69,15 +67,15 @@ def find_floor(frames: Frames) -> float | None:
     return float(first - share[:first][-2:].sum() + (1 - share[first : first + 2]).sum())
 
 
-def view_of(frames: Frames, *, scale: float, floor: float) -> View:
+def view_of(frames: Frames, *, scale: float, floor: float, extent: float) -> View:
     """Look for the object, and cut out a square around its motion and the floor under it.
 
-    floor: row of its surface.  Raises InvalidProblem (field video) unless one object stays in view.
+    floor: row of its surface.  extent: of the object in the view, where the video has that many pixels or more.  Raises InvalidProblem (field video) unless one object stays in view.
     """
     height, width = frames.shape[1:3]
     require(0 < floor <= height, "floor", f"a row from 0 to {height}", floor)
-    left, top, right, bottom, extent = _find_object(frames, floor)
-    shrink = max(1.0, extent / ENOUGH)
+    left, top, right, bottom, own = _find_object(frames, floor)
+    shrink = max(1.0, own / extent)
     margin = AROUND * shrink
     lower = max(bottom + margin, floor + margin)
     side = int(np.ceil(max(right - left + 2 * margin, lower - top + margin)))

@@ -108,7 +108,7 @@ def test_a_wide_video_is_cut_to_the_motion(tasks: TaskBatch) -> None:
     sample = tasks.samples[1]
     frames = drawn(sample.task.body.vertices, sample.task.trajectory.poses)
     wide = np.concatenate([np.repeat(frames[:, :, :1], 200, axis=2), frames], axis=2)
-    view = view_of(wide, scale=SCALE, floor=180.0)
+    view = view_of(wide, scale=SCALE, floor=180.0, extent=28.0)
     assert view.camera.size < 80
     answer = infer(Clip(frames=wide, times=0.1 * np.arange(5)), KNOWN)
     poses = answer.planned.perceived.poses - [
