@@ -53,7 +53,7 @@ def draw(
             draw_slice(figure.add_subplot(*place), arrangement, answer)
         else:
             draw_component(figure.add_subplot(*place, projection="3d"), arrangement, report)
-    save_figure(figure, path)
+    save_figure(figure, path, colours=128)
 
 
 def _arrangement(task: CageProblem | Arrangement, answer: CageSolution | None) -> Arrangement:

@@ -55,13 +55,17 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Write a still picture atomically."""
+def save_figure(figure: Figure, path: str | os.PathLike[str], *, colours: int | None = None) -> None:
+    """Write a still picture atomically; a .png with a palette of at most `colours` <= 256, which makes it smaller."""
     buffer = io.BytesIO()
     ending = suffix(path)
     # No date in the file: the same plan gives the same bytes.
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(ending)
     figure.savefig(buffer, format=ending[1:], metadata=metadata)
+    if colours and ending == ".png":
+        picture = Image.open(buffer).convert("RGB").quantize(colours, dither=Image.Dither.NONE)
+        buffer = io.BytesIO()
+        picture.save(buffer, "png", optimize=True)
     write_atomically(path, buffer.getvalue())
 
 
