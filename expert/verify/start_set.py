@@ -7,6 +7,7 @@ import numpy as np
 import shapely
 
 from expert.geometry.pose import Array
+from expert.types import require
 from expert.verify.cspace_cells import START, TURN, Cell, CellComplex
 from expert.verify.finger_path import FingerPath
 from expert.verify.slab import signed_bounds
@@ -77,7 +78,11 @@ class StartSet:
         return f"start      Q0 has {self.area:.3g} m^2 at the goal's orientation and reaches [{low:.4g}, {high:.4g}] deg"
 
     def starts(self, rng: np.random.Generator, count: int) -> Array:
-        """World poses (count, 3), uniform over the prisms (in position and orientation)."""
+        """World poses (count, 3), uniform over the prisms (in position and orientation).
+
+        Raises InvalidProblem where the goal is not caged.
+        """
+        require(self.bounded, "fingers.path", "fingers that cage the goal at the first knot", "an open cage")
         prisms = [
             (cell, self._cells.outer(cell).polygons[k]) for cell, ks in self._prisms.items() for k in ks
         ]
