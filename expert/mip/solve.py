@@ -51,7 +51,7 @@ def solve(
     """Minimise; the incumbent, if any, is left in the problem's variables.  Never prints.
 
     scip: linear or convex quadratic.  highs: linear.  gurobi: both, with a licence.  time_limit [s] excludes compilation, and
-    is processor time for scip.
+    is processor time for scip, and for highs where there are integers.
     Raises KeyboardInterrupt when interrupted, InvalidProblem for a solver that is missing or does not fit.
     """
     start = time.perf_counter()
