@@ -23,12 +23,14 @@ from rich.table import Table
 
 from datasets.disturb import DISTURBANCES, random_palette
 from datasets.motions import FAMILIES, NoRoom, sample_task
-from datasets.render import Camera, Frames, Palette, render
+from datasets.render import Camera, Frames, Palette, ground_coverage, render
 from datasets.shapes import ShapeFamily, Shapes
 from datasets.shapes_omnipush import OmniPush
 from datasets.specification import generator
 from dlm.perception import Perceived, PerceptionSettings, perceive
+from dlm.perception.raster import coverage
 from expert.errors import InvalidProblem
+from expert.geometry.pose import Array, to_world
 from expert.mechanics import external_contacts
 from expert.types import Body, ContactTask, Trajectory
 from tests.dlm.perception.mujoco_video import mujoco_videos
@@ -37,6 +39,7 @@ KINDS: dict[str, ShapeFamily] = {"4-6": Shapes(), "12": Shapes(facets=(12, 12)),
 """Shapes by name."""
 MUJOCO = {"MuJoCo": False, "MuJoCo, lens": True}
 """Videos of another engine: orthographic, or through a lens."""
+EXACT = "exact coverage"
 BOTH_SCALES = ("clean", "noise 3", "noise 5")
 BARS = {("4-6", "clean", "angle"): 0.1, ("4-6", "clean", "position"): 0.1, ("4-6", "noise 15", "angle"): 1.0}
 """Medians that must hold: angle [deg], position [mm]."""
@@ -81,11 +84,25 @@ def errors(seen: Perceived, task: ContactTask) -> Row:
     }
 
 
+def exactly(vertices: Array, poses: Array, camera: Camera) -> Frames:
+    """Rendered with exact coverage, then rounded: what is left is what perception itself gets wrong."""
+    palette = Palette()
+    background, thing, ground = (
+        np.array(c, dtype=float) for c in (palette.background, palette.object, palette.ground)
+    )
+    scene = background + ground_coverage(camera)[..., None] * (ground - background)
+    corners = camera.to_pixels(to_world(poses, vertices)) * [1, -1] + [0, camera.size]
+    share, _ = coverage(corners, np.zeros((len(poses), 2)), camera.size, camera.size)
+    return np.rint(scene + share[:, ::-1, :, None] * (thing - scene)).astype(np.uint8)
+
+
 def videos_of(tasks: list[ContactTask], disturbance: str, camera: Camera) -> list[Frames] | None:
     """One video per task; None where the engine is missing."""
     scenes = [(task.body.vertices, task.trajectory.poses) for task in tasks]
     if disturbance in MUJOCO:
         return mujoco_videos(scenes, camera, perspective=MUJOCO[disturbance])
+    if disturbance == EXACT:
+        return [exactly(*scene, camera) for scene in scenes]
     videos = []
     for index, scene in enumerate(scenes):
         rng = np.random.default_rng([index, 17])
@@ -159,7 +176,7 @@ def main() -> int:
     for kind in KINDS:
         tasks = tasks_of(kind, count, seeds)
         perceive(render(tasks[0].body.vertices, tasks[0].trajectory.poses))  # compiles
-        for disturbance in [*DISTURBANCES, "colours", *MUJOCO]:
+        for disturbance in [EXACT, *DISTURBANCES, "colours", *MUJOCO]:
             for scale in (0.004, 0.005) if disturbance in BOTH_SCALES else (0.004,):
                 if (options.only or "") in f"{kind} {disturbance} {scale}":
                     row = measure(kind, disturbance, scale, tasks, console)
