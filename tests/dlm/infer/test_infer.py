@@ -73,8 +73,8 @@ def test_the_expert_plans_for_what_was_perceived(clips: list[tuple[Sample, Path]
 def test_a_known_size_gives_the_scale(clips: list[tuple[Sample, Path]], answers: list[Inference]) -> None:
     (sample, path), known = clips[0], answers[0]
     answer = infer(path, Scene(object_size=sample.task.body.size))
-    assert answer.view.scale == pytest.approx(SCALE, rel=0.01)
-    np.testing.assert_allclose(answer.planned.perceived.poses, known.planned.perceived.poses, atol=1e-3)
+    assert answer.view.scale == pytest.approx(SCALE, rel=0.02)  # as well as a compressed outline is seen
+    np.testing.assert_allclose(answer.planned.perceived.poses, known.planned.perceived.poses, atol=2e-3)
 
 
 def test_more_or_fewer_frames_than_steps_are_resampled(tasks: TaskBatch, tmp_path: Path) -> None:

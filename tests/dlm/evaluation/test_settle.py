@@ -1,0 +1,54 @@
+import torch
+from torch import nn
+
+from dlm.derender import NetworkSizes
+from dlm.evaluation.settle import settle
+from dlm.inverse_dynamics import InverseDynamics
+from dlm.losses import ActionLoss
+from dlm.models import Policy, ThesisModel
+from dlm.parameters import Layout
+from dlm.tasks import TaskBatch
+from dlm.training import Schedule, Training
+
+SMALL = NetworkSizes(channels=(2, 3, 4), latent=8, recurrent_layers=1, hidden_layers=1, dropout=0.5)
+
+
+def trained(tasks: TaskBatch) -> Policy:
+    policy = ThesisModel(sizes=SMALL, layout=Layout()).build("perceptron", InverseDynamics(), seed=0)
+    policy.fit_centre(tasks)
+    training = Training(policy, ActionLoss(), tasks, Schedule(batch_size=4, learning_rate=1e-2))
+    for _ in range(5):
+        training.iterate()
+    return policy
+
+
+def answer(policy: Policy, tasks: TaskBatch) -> torch.Tensor:
+    with torch.no_grad():
+        return policy(tasks.video).positions
+
+
+def test_a_settled_network_answers_as_batch_statistics_without_dropout_would_have_it(
+    tasks: TaskBatch,
+) -> None:
+    policy = trained(tasks).train()
+    for module in policy.modules():
+        if isinstance(module, nn.Dropout):
+            module.eval()
+    wanted = answer(policy, tasks)
+    policy.eval()
+    assert (answer(policy, tasks) - wanted).abs().max() > 1e-3  # running averages differ
+    weights = [p.clone() for p in policy.parameters()]
+    settle(policy, tasks)
+    assert not policy.training
+    got = answer(policy, tasks)
+    # The unbiased variance that is kept, n / (n - 1) of the batch's, shrinks the answer's deviations a little.
+    assert (got - wanted).abs().max() < 0.5 * wanted.std()
+    assert all(torch.equal(a, b) for a, b in zip(weights, policy.parameters(), strict=True))
+
+
+def test_settling_twice_changes_nothing_more(tasks: TaskBatch) -> None:
+    policy = trained(tasks)
+    settle(policy, tasks)
+    once = answer(policy, tasks)
+    settle(policy, tasks)
+    torch.testing.assert_close(answer(policy, tasks), once)
