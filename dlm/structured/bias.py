@@ -40,5 +40,5 @@ class Bias:
         return replace(tasks, video=torch.from_numpy(np.stack(seen)), samples=samples)
 
 
-STATED = Bias(shift_x=2e-3, shift_y=1e-3, inflation=8e-4, blur=0.5)
-"""Half a pixel to the side, a quarter up, a fifth of a pixel too large, half a pixel out of focus."""
+STATED = Bias(shift_x=2e-3, shift_y=1e-3, inflation=8e-4)
+"""Half a pixel to the side, a quarter up, outlines a fifth of a pixel too far out."""

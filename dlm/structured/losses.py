@@ -113,7 +113,7 @@ class CalibrationLoss:
     """
 
     simulator: SimulatorSettings
-    step: float = 0.25
+    step: float = 0.5
     prior: float = 1e-4
     bias: Bias | None = None
 
