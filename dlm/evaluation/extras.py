@@ -37,8 +37,11 @@ class Extra:
 
 
 def read_extras(paths: Iterable[str | Path]) -> list[Extra]:
-    """Raises InvalidProblem for a file that is none."""
-    return [_read(Path(path)) for path in paths]
+    """Results in files, and in all JSON files of folders.  Raises InvalidProblem for a file that holds none."""
+    given = [Path(path) for path in paths]
+    return [
+        _read(file) for path in given for file in (sorted(path.glob("*.json")) if path.is_dir() else [path])
+    ]
 
 
 def _read(path: Path) -> Extra:

@@ -66,7 +66,7 @@ class Report:
             "Paired tests": self._tests(),
             "Curves": _figure(self.curves, CURVES),
             "Whole motions": _figure(self.qualitative, QUALITATIVE),
-            **{extra.title: _extra(extra) for extra in self.extras},
+            **{extra.title: extra_section(extra) for extra in self.extras},
             "Examples": _note(FILMS) + "".join(map(_example, self.examples)),
             "How it came about": self._origin(),
         }
@@ -162,7 +162,8 @@ def png(figure: Figure) -> bytes:
     return out.getvalue()
 
 
-def _extra(extra: Extra) -> str:
+def extra_section(extra: Extra) -> str:
+    """A result of another experiment: its table or chart, and what made it."""
     caption = extra.caption + (f" Made by: {extra.command}" if extra.command else "")
     table = (
         _grid(extra.columns, [[_cell(value) for value in row] for row in extra.rows]) if extra.rows else ""

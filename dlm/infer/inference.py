@@ -160,7 +160,7 @@ def look(
         floor = lowest_row(segmentation.paint(clip.frames, float(clip.frames.shape[1])))
     frames = segmentation.paint(clip.frames, floor)
     scale = scene.scale or UNKNOWN_SCALE
-    tried = []
+    tried: list[tuple[bool, float, int, View, Perceived]] = []
     for extent in EXTENTS:
         view = view_of(frames, scale=scale, floor=floor, extent=extent)
         seen = perceive(view.frames, view.camera, settings)
