@@ -146,24 +146,24 @@ class GoalCell:
             below = self.ray_rows(k, -np.inf, -eps)
             falling = Rows(side * below.V, np.array([-np.inf]), np.array([0.0]))
             parts += [below.at(side * limit), below.at(side * reach), falling.slope(side * limit)]
-        return self._with_jaws(parts)
+        return Rows.join([*parts, self.jaws] if self.jaws is not None else parts)
+
+    def held(self, moment: float = LEAST_MOMENT) -> list[Rows]:
+        """All fingers touch at the goal, as the grippers allow, and the rays' moments hold it (form closure)."""
+        touch, level = self.clearance().at(0.0), self.moments()
+        least = np.zeros(1) if self.concurrent else np.full(2, moment)
+        most = np.zeros(1) if self.concurrent else np.full(2, np.inf)
+        hold = Rows(level.V[: len(least)], least, most)
+        return [Rows(touch.V, touch.low, touch.low), hold, *([self.jaws] if self.jaws is not None else [])]
 
     def end(self, reach: float, moment: float = LEAST_MOMENT) -> Rows:
-        """Conditions at the last knot: all fingers touch at the goal, and the rays' moments hold it (form closure)."""
-        eps = self.slack(reach)
-        touch = self.clearance().at(0.0)
-        parts = [self.contacts.over(-reach, reach), Rows(touch.V, touch.low, touch.low)]
-        if self.concurrent:
-            level = self.moments()
-            return self._with_jaws([*parts, Rows(level.V[:1], np.zeros(1), np.zeros(1))])
-        for k, side in ((self.up, 1.0), (self.down, -1.0)):
-            below = self.ray_rows(k, -np.inf, -eps)
-            falling = Rows(side * below.V, np.array([-np.inf]), np.array([-moment]))
-            parts += [below.at(side * reach), falling.slope(0.0)]
-        return self._with_jaws(parts)
-
-    def _with_jaws(self, parts: list[Rows]) -> Rows:
-        return Rows.join([*parts, self.jaws] if self.jaws is not None else parts)
+        """Conditions at the last knot: the grasp holds, and the object is shut out on arrival at +-reach."""
+        parts = [self.contacts.over(-reach, reach), *self.held(moment)]
+        if not self.concurrent:
+            eps = self.slack(reach)
+            for k, side in ((self.up, 1.0), (self.down, -1.0)):
+                parts.append(self.ray_rows(k, -np.inf, -eps).at(side * reach))
+        return Rows.join(parts)
 
     def moments(self) -> Rows:
         """f'(0) >= 0 of the ray that shuts the cell below, -f'(0) >= 0 of the one above."""

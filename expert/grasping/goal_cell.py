@@ -154,6 +154,17 @@ def firmest_end(cell: GoalCell, reach: float) -> float | None:
     return None if answer.x is None else float(answer.x[-1])
 
 
+def can_end(cell: GoalCell) -> bool:
+    """Whether fingers anywhere on the facets, and as the grippers allow, can hold the object at the goal at all."""
+    index = list(cell.chosen)
+    along = Rows(
+        np.eye(cell.count)[:, :, None] * cell.table.tangents[index],
+        cell.table.low[index],
+        cell.table.high[index],
+    )
+    return some_knot(cell, Rows.join([*cell.held(), along])) is not None
+
+
 def some_knot(cell: GoalCell, rows: Rows) -> Array | None:
     """Fingers (N, 2) that meet all rows."""
     size = 2 * cell.count

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from expert.caging.frame import Frame
-from expert.errors import InvalidProblem
+from expert.errors import InvalidProblem, SolverFailed
 from expert.geometry.polygon import signed_area
 from expert.geometry.pose import Array
 from expert.grasping.cell import GoalCell
@@ -19,6 +19,7 @@ from expert.grasping.goal_cell import (
     DIRECTIONS,
     REACH,
     Candidate,
+    can_end,
     candidate,
     cells,
     hold,
@@ -105,7 +106,9 @@ class Search:
                 middles = 0.5 * (self.table.low + self.table.high)[:, None] * self.table.tangents
                 feet = middles + self.table.offsets[:, None] * self.table.normals
                 held = jaws(self.problem, self.frame, places, feet[list(cell.chosen)])
-            yield replace(cell, jaws=held), places
+            labelled = replace(cell, jaws=held)
+            if held is None or can_end(labelled):
+                yield labelled, places
 
 
 def goal_cells(search: Search) -> Iterator[Proposal]:
@@ -145,7 +148,10 @@ def _path_of_cell(search: Search, known: Candidate, places: Places) -> Proposal 
     reaches = np.concatenate([ranges[:1], ranges[:-2]])
     knots = [cell.knot(reach, limit) for reach, limit in zip(reaches, ranges[:-1], strict=True)]
     end = cell.end(ranges[-2], FIRMNESS * known.firmest)
-    path = smoothest([*knots, end], None if search.by_acceleration else known.start)
+    try:
+        path = smoothest([*knots, end], None if search.by_acceleration else known.start)
+    except SolverFailed:  # says nothing about this cell; the next one is as good
+        return None
     if path is None:
         return None
     return Proposal(path, cell.chosen, region(cell, path[0]), "goal_cell").labelled(places)
