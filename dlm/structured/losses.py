@@ -114,7 +114,7 @@ class CalibrationLoss:
 
     simulator: SimulatorSettings
     step: float = 0.5
-    prior: float = 1e-4
+    prior: float = 1e-3
     bias: Bias | None = None
 
     def __call__(self, policy: Policy, tasks: TaskBatch) -> Tensor:

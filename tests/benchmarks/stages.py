@@ -41,24 +41,27 @@ from tests.benchmarks.structured import SEED, Record, executed, fresh
 
 Act = Callable[[Sample, Frames], Action]
 KINDS = {"nn": "regressor", "nnm": "regressor", "mdr": "best_guess"}
+CHECKED = "MDR, 8 checked"
+"""The scorer of MDR with the planner of CVX."""
 PAIRS = (
     ("NN", "NNM"),
     ("NNM", "MDR"),
-    ("MDR", "CVX"),
-    ("CVX", "DLM"),
-    ("CVX", "no learning"),
+    ("MDR", CHECKED),
+    (CHECKED, "CVX"),
+    (CHECKED, "DLM"),
+    (CHECKED, "no learning"),
     ("no learning", "expert"),
 )
-BIASED_PAIRS = (("CVX", "DLM"), ("CVX", "DLM for this camera"))
+BIASED_PAIRS = ((CHECKED, "DLM"), (CHECKED, "DLM for this camera"))
 
 
-def policy(folder: Path, stage: str, see: Perceiver) -> Policy | None:
+def policy(folder: Path, stage: str, see: Perceiver, kind: str = "") -> Policy | None:
     """A trained stage, None if there is no such checkpoint."""
     path = folder / f"{stage}.safetensors"
     if not path.is_file():
         print(f"no {path}: left out", file=sys.stderr)
         return None
-    built = StructuredArchitecture().build(KINDS.get(stage, "proposals"))  # type: ignore[arg-type]
+    built = StructuredArchitecture().build(kind or KINDS.get(stage, "proposals"))  # type: ignore[arg-type]
     assert isinstance(built, ProposalPolicy | RegressorPolicy)
     built.base = _seeing(built.base, see)
     restore_weights(
@@ -126,19 +129,23 @@ def main() -> int:
     torch.set_num_threads(1)
     count = 20 if options.quick else options.tasks
     see = Perceiver()
-    trained = {
-        s: policy(options.output / f"seed_{options.seed}", s, see)
-        for s in ("nn", "nnm", "mdr", "cvx", "dlm", "dlm_biased")
-    }
+    folder = options.output / f"seed_{options.seed}"
+    trained = {s: policy(folder, s, see) for s in ("nn", "nnm", "mdr", "cvx", "dlm", "dlm_biased")}
+    if (one := policy(folder, "mdr", see, "proposals")) is not None:
+        trained[CHECKED] = one
     plain = StructuredModel(perceive=see)
     rows: dict[str, Act] = {"no action": lambda s, v: idle_action(TaskBatch.of([s]))}
-    rows |= {s.upper(): of_policy(p) for s, p in trained.items() if p is not None and s != "dlm_biased"}
+    rows |= {
+        s if s == CHECKED else s.upper(): of_policy(p)
+        for s, p in trained.items()
+        if p is not None and s != "dlm_biased"
+    }
     rows |= {
         "no learning": of_model(plain),
         "expert": of_model(StructuredModel(planner=ExpertPlanner(), perceive=see)),
         "oracle": lambda s, v: expert_action(TaskBatch.of([s])),
     }
-    biased = {n: rows[n] for n in ("no action", "CVX", "DLM") if n in rows}
+    biased = {n: rows[n] for n in ("no action", CHECKED, "DLM") if n in rows}
     if (one := trained["dlm_biased"]) is not None:
         biased["DLM for this camera"] = of_policy(one)
     results: dict[str, dict[str, list[Record]]] = {}
