@@ -172,6 +172,7 @@ def test_the_report_fits_desks_and_telephones(results: Path, tmp_path: Path, wid
     assert int(found[1]) == 0 or width < 1200
 
 
+@pytest.mark.slow
 def test_the_same_seeds_give_the_same_weights_side_by_side_and_after_a_kill(workplace: Path) -> None:
     """Two seeds one after the other, undisturbed; and in two processes, killed at a random moment and gone on with."""
     seeds = (3, 4)

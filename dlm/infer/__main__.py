@@ -14,7 +14,8 @@ from datasets.entry import entry_point
 from dlm.infer.drawing import draw_inference
 from dlm.infer.inference import Inference, Scene, infer
 from dlm.infer.segmentation import Segmentation
-from dlm.structured.weights import trained_model
+from dlm.structured import StructuredModel
+from dlm.structured.weights import SHIPPED, trained_model
 from expert.files.document import save
 from expert.types import require
 
@@ -41,7 +42,7 @@ def main(cfg: DictConfig) -> None:
                 background=cfg.background,
                 tolerance=cfg.tolerance,
             ),
-            model=None if cfg.checkpoint is None else trained_model(Path(cfg.checkpoint)),
+            model=chosen_model(cfg.checkpoint),
             refine=cfg.refine,
             start=cfg.start,
             end=cfg.end,
@@ -52,6 +53,13 @@ def main(cfg: DictConfig) -> None:
     tell(answer, folder)
     if answer.plan is None:
         sys.exit(NO_PLAN)
+
+
+def chosen_model(checkpoint: str | None) -> StructuredModel | None:
+    """The model with the given weights; None: the default one."""
+    if checkpoint is None:
+        return None
+    return trained_model(SHIPPED if checkpoint == "shipped" else Path(checkpoint))
 
 
 def write(answer: Inference, folder: Path) -> None:

@@ -87,6 +87,15 @@ def test_a_video_becomes_actions_that_others_can_read(
 
 GOOD = ["video=good.mp4", "scale=0.001"]
 
+
+def test_the_shipped_weights_find_a_plan_too(
+    run: Callable[..., tuple[object, str, str]], folder: Path
+) -> None:
+    code, said, errors = run(*GOOD, "checkpoint=shipped", "out=shipped")
+    assert (code, errors) == (0, "")
+    assert re.search(r"simulated: ends [01]\.\d+ mm", said)
+
+
 WRONG = {
     "no video": ([], "video"),
     "no such file": (["video=none.mp4", "scale=0.001"], "video: expected a file, got none.mp4"),
