@@ -27,6 +27,7 @@ from rich.table import Table
 
 from datasets.specification import Sample
 from datasets.store import read_dataset
+from dlm.checkpoint import load, restore_weights
 from dlm.evaluation.outcomes import Outcome, execute
 from dlm.execution import given_action, idle_where_unsolved, simulate
 from dlm.inverse_dynamics import Action, InverseDynamics
@@ -39,6 +40,7 @@ from dlm.structured.losses import class_distance
 from dlm.structured.planning import Planning
 from dlm.structured.policies import Perceiver, StructuredArchitecture, joined, unsolved
 from dlm.structured.scorer import Scorer
+from dlm.structured.weights import SHIPPED
 from dlm.tasks import TaskBatch
 from expert.errors import InvalidProblem
 from tests.benchmarks.structured import SEED, fresh, seen
@@ -215,13 +217,19 @@ def splitting(samples: dict[str, list[Sample]], options: argparse.Namespace) -> 
 def data(samples: dict[str, list[Sample]], options: argparse.Namespace) -> list[Row]:
     """Sizes of the training set."""
     rows: list[Row] = []
-    examples = _examples(options, None)
-    for count in sorted({n for n in (20, 200, 2000, 10000) if n < len(examples)} | {len(examples)}):
+    examples = _examples(options, max(options.sizes))
+    for count in sorted({min(n, len(examples)) for n in options.sizes}):
         scorer = trained(examples[:count], splitting=True, steps=options.steps)
         rows += [
             {"training tasks": count, "facets": kind, **ranks(scorer, some)} for kind, some in samples.items()
         ]
-    return rows
+    weights = load(SHIPPED, command="python -m dlm.structured.weights")
+    policy = StructuredArchitecture().proposer()
+    restore_weights(policy.weights(), weights, name="structured", source=SHIPPED)
+    return rows + [
+        {"training tasks": "10000 (shipped)", "facets": kind, **ranks(policy.scorer, some)}
+        for kind, some in samples.items()
+    ]
 
 
 def _examples(options: argparse.Namespace, most: int | None) -> list[Example]:
@@ -260,6 +268,7 @@ def main() -> int:
     )
     parser.add_argument("--tasks", type=int, default=100)
     parser.add_argument("--steps", type=int, default=STEPS)
+    parser.add_argument("--sizes", type=int, nargs="+", default=[20, 200, 2000, 10000], help="for `data`")
     parser.add_argument("--only", nargs="+", choices=list(STUDIES), default=list(STUDIES))
     parser.add_argument("--data", type=Path, default=Path("data/large-seed0"), help="training tasks")
     parser.add_argument("--folder", type=Path, default=Path("data"), help="where the fresh tasks are kept")
