@@ -1,5 +1,6 @@
 """Pictures of cages and escapes, through the command line, from files."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -99,3 +100,14 @@ def test_linked_slices_leave_out_what_the_start_cannot_reach() -> None:
     reached = linked_slices(a, angles)
     assert all(len(parts) == 1 for parts in reached)
     assert reached[4][0].covers(shapely.Point(0, 0))
+
+
+def test_the_gallery_shows_what_make_figures_draws() -> None:
+    page = Path("docs/gallery.md").read_text()
+    listed = re.search(r"^CAGES := ((?:.|\\\n)*?)$(?<!\\)", Path("Makefile").read_text(), flags=re.MULTILINE)
+    assert listed
+    names = set(listed[1].replace("\\\n", " ").split())
+    assert names == set(re.findall(r"\(gallery/cage_(\w+)\.png\)", page))
+    for name in names:
+        assert (PROBLEMS / f"{name}.yaml").exists()
+        assert Path(f"docs/gallery/cage_{name}.png").stat().st_size < 100_000
