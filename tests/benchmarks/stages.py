@@ -52,6 +52,7 @@ PAIRS = (
     (CHECKED, "no learning"),
     ("no learning", "expert"),
 )
+SETS = ("4-6", "12", "biased")
 BIASED_PAIRS = ((CHECKED, "DLM"), (CHECKED, "DLM for this camera"))
 
 
@@ -124,6 +125,7 @@ def main() -> int:
     parser.add_argument("--output", type=Path, default=Path("runs/large"))
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--folder", type=Path, default=Path("data"))
+    parser.add_argument("--sets", nargs="+", choices=SETS, default=list(SETS))
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     torch.set_num_threads(1)
@@ -149,12 +151,13 @@ def main() -> int:
     if (one := trained["dlm_biased"]) is not None:
         biased["DLM for this camera"] = of_policy(one)
     results: dict[str, dict[str, list[Record]]] = {}
-    for kind in ("4-6", "12"):
-        samples = fresh(kind, count, SEED + 2, options.folder)
-        results[f"{kind} facets"] = run(rows, samples, [s.video for s in samples], kind)
-        if kind == "4-6":
+    for name in options.sets:
+        samples = fresh("4-6" if name == "biased" else name, count, SEED + 2, options.folder)
+        if name == "biased":
             videos = [STATED.video(s.task.body, s.task.trajectory.poses, plain.camera) for s in samples]
-            results["4-6 facets, biased camera"] = run(biased, samples, videos, "biased")
+            results["4-6 facets, biased camera"] = run(biased, samples, videos, name)
+        else:
+            results[f"{name} facets"] = run(rows, samples, [s.video for s in samples], name)
     report = {}
     for title, found in results.items():
         table = Table("", "mean", "median", "within", "dropped", title=title)
