@@ -46,7 +46,7 @@ def run(command: list[str] | str, cwd: Path, *, shell: bool = False) -> str:
 def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The repository as a fresh folder: code by links, results apart."""
     folder = tmp_path_factory.mktemp("checkout")
-    for name in ("expert", "datasets", "dlm", "configs", "tests", "train.py", "evaluate.py", "Makefile"):
+    for name in ("expert", "datasets", "dlm", "configs", "tests", "docs", "train.py", "evaluate.py", "Makefile"):
         (folder / name).symlink_to(ROOT / name)
     binaries = folder / ".venv" / "bin"
     binaries.mkdir(parents=True)
@@ -61,7 +61,7 @@ def test_there_are_commands_for_all_parts() -> None:
     text = "\n".join(COMMANDS)
     for word in ("make demo", "make test", "expert solve", "expert verify", "expert draw"):
         assert word in text
-    for word in ("datasets.generate", "train.py", "evaluate.py"):
+    for word in ("datasets.generate", "train.py", "evaluate.py", "dlm.infer"):
         assert word in text
 
 
@@ -74,6 +74,8 @@ def test_commands_run_in_their_order(checkout: Path) -> None:
             report = Path(re.findall(r"^report: (.+)$", output, flags=re.MULTILINE)[-1])
             assert report.stat().st_size > 1e5
     assert (checkout / "pivot.png").stat().st_size > 1000
+    assert (checkout / "clip" / "motion.gif").stat().st_size > 1e4
+    assert (checkout / "grasp.png").stat().st_size > 1000
     assert (checkout / "runs" / "smoke" / "table_4_1.csv").is_file()
 
 
