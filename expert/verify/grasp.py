@@ -182,7 +182,7 @@ class _Check:
             jams = [self._dead_end(e) for e in events if tube.meets(e.s, e.first, e.last)]
             alone = tube.closed and self._alone(tube)
             sure = any(jam.witness is not None for jam in jams)
-            if sure or not tube.closed or (alone and not jams):
+            if sure or (alone and not jams) or time.process_time() > deadline:
                 break
         self._record(tube, jams, len(events), alone)
         self._conclude(tube, jams, alone)

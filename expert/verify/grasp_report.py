@@ -103,6 +103,8 @@ class DeadEnds:
     def __str__(self) -> str:
         if self.verdict == "no_jam":
             return f"dead ends  no_jam: none of {self.listed} can be reached"
+        if not self.events:
+            return "dead ends  may_jam: what can be reached is not bounded"
         first = self.events[0]
         sure = "with a witness start" if self.witness is not None else "not shown to be unreachable"
         return (

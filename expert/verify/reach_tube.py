@@ -19,7 +19,7 @@ from expert.verify.slab import Reached, Slab, SlabFlood, coarsened, uniform_ring
 COARSEST = 64
 """Width of the widest cells that are of use, in units of the cage verifier: 4 degrees."""
 LEAST_SLACK = 1e-5
-"""Slabs in which fingers move by less than twice this relative length are not halved."""
+"""Slabs in which fingers move by less than twice this relative length (at first ten times as far) are not halved."""
 NEAR_GOAL: Reached = {Cell(0, 1): [shapely.Point(0, 0)], Cell(TURN - 1, 1): [shapely.Point(0, 0)]}
 
 
@@ -51,7 +51,8 @@ def reach_tube(path: FingerPath, limit: float, coarsest: int, deadline: float) -
     deadline: processor time at which to give up.
     """
     tube = Tube()
-    longest = 2 * coarsest * UNIT if coarsest < COARSEST else np.inf
+    first_round = coarsest == COARSEST
+    longest, shortest = (np.inf, 10 * LEAST_SLACK) if first_round else (2 * coarsest * UNIT, LEAST_SLACK)
     first = settled_slab(path, 0.0, 0.0, uniform_ring(coarsest), NEAR_GOAL, limit)
     if first is None:
         tube.leak = 0.0, 0.0
@@ -65,7 +66,7 @@ def reach_tube(path: FingerPath, limit: float, coarsest: int, deadline: float) -
         slab = settled_slab(path, s, high, ring, sources, limit)
         if slab is None:
             stride = 0.5 * (high - s)
-        if time.process_time() > deadline or (slab is None and _motion(path, s, high) < 2 * LEAST_SLACK):
+        if time.process_time() > deadline or (slab is None and _motion(path, s, high) < 2 * shortest):
             tube.leak = s, high
             return tube
         if slab is not None:

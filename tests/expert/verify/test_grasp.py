@@ -151,7 +151,9 @@ def test_a_cage_that_opens_between_knots_is_not_certified() -> None:
         [0.052, 0.0299],
     ]  # one finger crosses over: all the way it is near the corners
     path[1:3, 0] += [[0.0, -0.03], [0.0, 0.0]]
-    assert not verify_grasp(problem, path).certified
+    report = verify_grasp(problem, path)
+    assert not report.certified
+    assert report.reason in str(report)
 
 
 def test_a_finger_that_crosses_the_object_is_refuted() -> None:
