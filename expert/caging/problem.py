@@ -49,15 +49,18 @@ class Shape:
         require(len(pieces) > 0, "object.pieces", "at least one convex polygon", "none")
         checked = [_convex_piece(p, k) for k, p in enumerate(pieces)]
         size = diameter(np.concatenate(checked))
-        union = shapely.union_all([shapely.Polygon(p) for p in checked], grid_size=1e-10 * size)
-        whole = union.geom_type == "Polygon"
+        grid = 1e-10 * size  # corners are put on it first: a union alone that does so may leave slivers
+        snapped = shapely.set_precision([shapely.Polygon(p) for p in checked], grid)
+        parts = shapely.get_parts(shapely.union_all(snapped, grid_size=grid))
         what = "pieces whose union is one polygon"
-        require(whole, "object.pieces", what, "parts that do not join along edges", "let them overlap")
-        holes = len(union.interiors)
+        require(
+            len(parts) == 1, "object.pieces", what, "parts that do not join along edges", "let them overlap"
+        )
+        holes = len(parts[0].interiors)
         require(
             holes == 0, "object.pieces", what, f"{holes} hole(s) in it", "a caged object must have no hole"
         )
-        outline = shapely.simplify(union, 1e-9 * size).exterior
+        outline = shapely.simplify(parts[0], 1e-9 * size).exterior
         return cls(vertices=np.array(outline.coords)[:-1], pieces=tuple(checked))
 
     @cached_property

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 
 from expert.__main__ import main
@@ -88,6 +88,8 @@ def test_pieces_that_fall_apart_are_noticed(seed: int, spread: float) -> None:
 
 
 @several
+@example(3, 0.9, 1.0)
+@example(3, 0.02, 5.585983599711722)
 @given(st.integers(3, 9), st.floats(0.02, 0.9), st.floats(0, 2 * np.pi))
 def test_a_hole_is_noticed(corners: int, inner: float, turn: float) -> None:
     angles = turn + 2 * np.pi * np.arange(corners) / corners
