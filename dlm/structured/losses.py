@@ -108,12 +108,14 @@ def regrets(sample: Sample, schedules: Schedules) -> Array:
 class CalibrationLoss:
     """4-CT10 as a function of the calibration, differentiated by central differences of `step` units through everything.
 
-    prior: price of a knob's square, so that knobs without effect stay where they are.  bias: the videos are seen anew by
+    A knob has a slope only where one of its sides is better by `worth` [cm^2]: L_sim is flat and steep in turns, and the
+    mere middle of a flat stretch is no reason to leave a calibration.  prior: price of a knob's square.  bias: the videos are seen anew by
     such a camera.
     """
 
     simulator: SimulatorSettings
     step: float = 0.5
+    worth: float = 1e-4
     prior: float = 1e-3
     bias: Bias | None = None
 
@@ -140,13 +142,14 @@ class _Differences(torch.autograd.Function):
         ctx: Any, knobs: Tensor, policy: ProposalPolicy, tasks: TaskBatch, loss: CalibrationLoss
     ) -> Tensor:
         here = knobs.detach().numpy().copy()
-        slopes = np.zeros(len(here))
+        value, slopes = loss.at(policy, tasks, here), np.zeros(len(here))
         for k in range(len(here)):
             step = loss.step * np.eye(len(here))[k]
             ahead, behind = (loss.at(policy, tasks, here + sign * step) for sign in (1, -1))
-            slopes[k] = (ahead - behind) / (2 * loss.step)
+            if min(ahead, behind) < value - loss.worth:
+                slopes[k] = (ahead - behind) / (2 * loss.step)
         ctx.slopes = torch.from_numpy(slopes)
-        return torch.tensor(loss.at(policy, tasks, here), dtype=torch.float64)
+        return torch.tensor(value, dtype=torch.float64)
 
     @staticmethod
     def backward(ctx: Any, *adjoints: Tensor) -> tuple[Tensor | None, ...]:

@@ -129,6 +129,15 @@ def test_the_calibration_s_gradient_points_away_from_the_bias(tasks: TaskBatch) 
     assert float(policy.knobs.grad[0]) > 0
 
 
+def test_without_bias_calibration_leaves_everything_as_it_is(tasks: TaskBatch) -> None:
+    policy = StructuredArchitecture().proposer()
+    loss = CalibrationLoss(simulator=SimulatorSettings())(policy, tasks[torch.arange(2)])
+    loss.backward()
+    assert float(loss.detach()) < 1e-3
+    assert policy.knobs.grad is not None
+    assert not policy.knobs.grad.any()
+
+
 def test_losses_refuse_policies_that_they_do_not_fit(tasks: TaskBatch) -> None:
     with pytest.raises(InvalidProblem, match="proposes contact classes"):
         ClassLoss()(SMALL.regressor(), tasks)
