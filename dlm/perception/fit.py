@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from dlm.perception.raster import coverage, is_simple
 from expert.geometry.polygon import NDArrayBool
-from expert.geometry.pose import Array, rotation
+from expert.geometry.pose import Array
 
 LONGEST_STEP = 1.0
 """No vertex moves further than this in one iteration [pixels]: the outline sees only the pixels that it crosses."""
@@ -55,17 +55,14 @@ class Scene:
 
     def derivative(self) -> Array:
         """Of placed vertices with respect to all parameters: vertices, then motion[1:]; (T, V, 2, 2 V + 3 (T - 1))."""
-        steps, count = len(self.motion), len(self.vertices)
-        turn = rotation(self.motion[:, 2])
-        out = np.zeros((steps, count, 2, 2 * count + 3 * steps))
-        for i in range(count):
-            out[:, i, :, 2 * i : 2 * i + 2] = turn
-        arms = (self.vertices - self.centre) @ np.swapaxes(turn, -1, -2)
-        for t in range(steps):
-            k = 2 * count + 3 * t
-            out[t, :, 0, k], out[t, :, 1, k + 1] = 1, 1
-            out[t, :, 0, k + 2], out[t, :, 1, k + 2] = -arms[t, :, 1], arms[t, :, 0]
-        return np.delete(out, np.s_[2 * count : 2 * count + 3], axis=-1)
+        steps, count = len(self.motion), self.vertices.size
+        out = np.zeros((steps, count, count + 3 * (steps - 1)))
+        for t, angle in enumerate(self.motion[:, 2]):
+            own = _frame(self.vertices - self.centre, angle)
+            out[t, :, :count] = own[:, :count]
+            if t > 0:
+                out[t, :, count + 3 * (t - 1) : count + 3 * t] = own[:, count:]
+        return out.reshape(steps, count // 2, 2, -1)
 
 
 @numba.njit(cache=True)
@@ -156,20 +153,27 @@ def _normal_equations(error: Array, weight: Array, gradient: Array) -> tuple[flo
 
 
 @numba.njit(cache=True)
+def _frame(arms: Array, angle: float) -> Array:
+    """Derivative of one step's placed vertices by the vertices at step 0 and by the step's motion, (2 V, 2 V + 3)."""
+    count = arms.size
+    out = np.zeros((count, count + 3))
+    c, s = np.cos(angle), np.sin(angle)
+    for i in range(0, count, 2):
+        x, y = arms[i // 2]
+        out[i, i], out[i, i + 1], out[i + 1, i], out[i + 1, i + 1] = c, -s, s, c
+        out[i, count], out[i + 1, count + 1] = 1.0, 1.0
+        out[i, count + 2], out[i + 1, count + 2] = -s * x - c * y, c * x - s * y
+    return out
+
+
+@numba.njit(cache=True)
 def _chain(slope: Array, square: Array, arms: Array, angles: Array) -> tuple[Array, Array]:
     """From placed vertices to the parameters: vertices, then motion[1:]."""
     steps, count = slope.shape
     size = count + 3 * (steps - 1)
     gradient, matrix = np.zeros(size), np.zeros((size, size))
     for t in range(steps):
-        c, s = np.cos(angles[t]), np.sin(angles[t])
-        # Columns: the derivative of the placed vertices by their own parameters (2 entries each), and by the motion.
-        frame = np.zeros((count, count + 3))
-        for i in range(0, count, 2):
-            x, y = arms[i // 2]
-            frame[i, i], frame[i, i + 1], frame[i + 1, i], frame[i + 1, i + 1] = c, -s, s, c
-            frame[i, count], frame[i + 1, count + 1] = 1.0, 1.0
-            frame[i, count + 2], frame[i + 1, count + 2] = -s * x - c * y, c * x - s * y
+        frame = _frame(arms, angles[t])
         local = frame.T @ square[t] @ frame
         pull = frame.T @ slope[t]
         offset = 3 * (t - 1)  # parameter `count` of the frame is `count + offset` of all
