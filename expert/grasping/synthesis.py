@@ -19,6 +19,8 @@ from expert.verify.grasp import verify_grasp
 Method = Literal["goal_cell", "decomposed", "miqp1", "miqp2"]
 MOST_CELLS = 8
 """Goal cells that the checker sees before the decomposed search takes over."""
+CHECK_SECONDS = 6.0
+"""Processor time that the checker may spend on what one proposal can reach: another one is often easier to confirm."""
 MOST_CHECKS = 20
 """Proposals that the checker sees before the search gives up."""
 
@@ -42,7 +44,9 @@ def _first_certified(search: Search, proposals: Iterator[Proposal]) -> GraspSolu
     kept: GraspSolution | None = None
     for proposal in itertools.islice(proposals, MOST_CHECKS):
         answer = _answer(search, proposal)
-        report = verify_grasp(search.problem, answer.path, answer.facets, full=False)
+        report = verify_grasp(
+            search.problem, answer.path, answer.facets, full=False, time_limit=CHECK_SECONDS
+        )
         if report.verdict == "certified":
             return replace(answer, status="certified", refuted=doubted)
         doubted += 1
