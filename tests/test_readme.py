@@ -46,7 +46,17 @@ def run(command: list[str] | str, cwd: Path, *, shell: bool = False) -> str:
 def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The repository as a fresh folder: code by links, results apart."""
     folder = tmp_path_factory.mktemp("checkout")
-    for name in ("expert", "datasets", "dlm", "configs", "tests", "docs", "train.py", "evaluate.py", "Makefile"):
+    for name in (
+        "expert",
+        "datasets",
+        "dlm",
+        "configs",
+        "tests",
+        "docs",
+        "train.py",
+        "evaluate.py",
+        "Makefile",
+    ):
         (folder / name).symlink_to(ROOT / name)
     binaries = folder / ".venv" / "bin"
     binaries.mkdir(parents=True)

@@ -3,10 +3,10 @@
 No proposal leaves as `certified` unless `expert.verify.grasp` has confirmed it.
 """
 
-import itertools
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from itertools import islice
 from typing import Literal
 
 from expert.errors import InvalidProblem
@@ -15,14 +15,13 @@ from expert.grasping.problem import GraspProblem, GraspSolution
 from expert.grasping.proposals import Proposal, Search, decomposed, goal_cells, thesis
 from expert.grasping.smooth import acceleration
 from expert.verify.grasp import verify_grasp
+from expert.verify.grasp_report import GraspReport
 
 Method = Literal["goal_cell", "decomposed", "miqp1", "miqp2"]
-MOST_CELLS = 8
-"""Goal cells that the checker sees before the decomposed search takes over."""
-CHECK_SECONDS = 6.0
-"""Processor time that the checker may spend on what one proposal can reach: another one is often easier to confirm."""
-MOST_CHECKS = 20
-"""Proposals that the checker sees before the search gives up."""
+MOST_CELLS, MOST_CHECKS = 8, 20
+"""Goal cells, and proposals of any other kind, that the checker sees."""
+QUICK_CHECK, PATIENT_CHECK = 3.0, 8.0
+"""Processor time [s] that the checker may spend on what one proposal can reach, at first and for those still in doubt."""
 
 
 def solve(problem: GraspProblem, *, method: Method = "goal_cell", time_limit: float = 30.0) -> GraspSolution:
@@ -35,30 +34,52 @@ def solve(problem: GraspProblem, *, method: Method = "goal_cell", time_limit: fl
         raise InvalidProblem("method", expected=" or ".join(METHODS), got=repr(method))
     began = time.perf_counter()
     search = Search(problem, began + time_limit)
-    answer = _first_certified(search, METHODS[method](search))
-    return replace(answer, method=answer.method or method, seconds=time.perf_counter() - began)
-
-
-def _first_certified(search: Search, proposals: Iterator[Proposal]) -> GraspSolution:
-    doubted = 0
-    kept: GraspSolution | None = None
-    for proposal in itertools.islice(proposals, MOST_CHECKS):
-        answer = _answer(search, proposal)
-        report = verify_grasp(
-            search.problem, answer.path, answer.facets, full=False, time_limit=CHECK_SECONDS
-        )
-        if report.verdict == "certified":
-            return replace(answer, status="certified", refuted=doubted)
-        doubted += 1
-        kept = kept or replace(answer, reason=report.reason)
-        if search.left <= 0:
+    doubted: list[GraspSolution] = []
+    for proposals in METHODS[method](search):
+        found = _first_certified(search, proposals, doubted)
+        if found is not None or search.left <= 0:
             break
-    if kept is not None:
-        return replace(kept, refuted=doubted)
+    answer = found or _without_certificate(search, doubted)
+    seconds = time.perf_counter() - began
+    return replace(answer, method=answer.method or method, refuted=len(doubted), seconds=seconds)
+
+
+def _first_certified(
+    search: Search, proposals: Iterator[Proposal], doubted: list[GraspSolution]
+) -> GraspSolution | None:
+    """The first proposal that the checker confirms; the others are added to `doubted`.
+
+    What it cannot decide quickly is put aside: mostly another proposal, hardly worse, is easier to confirm.
+    """
+    unsure: list[GraspSolution] = []
+    for proposal in proposals:
+        answer = _answer(search, proposal)
+        report = _check(search, answer, QUICK_CHECK)
+        if report.verdict == "certified":
+            return replace(answer, status="certified")
+        doubted.append(replace(answer, reason=report.reason))
+        if report.verdict == "unknown":
+            unsure.append(answer)
+        if search.left <= 0:
+            return None
+    for answer in unsure:
+        if search.left > 0 and _check(search, answer, PATIENT_CHECK).verdict == "certified":
+            doubted.pop()
+            return replace(answer, status="certified")
+    return None
+
+
+def _check(search: Search, answer: GraspSolution, seconds: float) -> GraspReport:
+    return verify_grasp(search.problem, answer.path, answer.facets, full=False, time_limit=seconds)
+
+
+def _without_certificate(search: Search, doubted: list[GraspSolution]) -> GraspSolution:
+    """The first answer that was not confirmed, or why there is none."""
+    if doubted:
+        return doubted[0]
     if search.left <= 0:
-        return GraspSolution(
-            status="time_limit", reason="the time limit was reached before any grasp was found"
-        )
+        reason = "the time limit was reached before any grasp was found"
+        return GraspSolution(status="time_limit", reason=reason)
     return GraspSolution(status="none_found", reason="no grasp of the kind searched for; others may exist")
 
 
@@ -75,14 +96,13 @@ def _answer(search: Search, proposal: Proposal) -> GraspSolution:
     )
 
 
-def _cells_then_cages(search: Search) -> Iterator[Proposal]:
-    yield from itertools.islice(goal_cells(search), MOST_CELLS)
-    yield from decomposed(search)
-
-
-METHODS: dict[str, Callable[[Search], Iterator[Proposal]]] = {
-    "goal_cell": _cells_then_cages,
-    "decomposed": decomposed,
-    "miqp1": lambda search: thesis(search, "miqp1"),
-    "miqp2": lambda search: thesis(search, "miqp2"),
+METHODS: dict[str, Callable[[Search], Iterable[Iterator[Proposal]]]] = {
+    "goal_cell": lambda search: (
+        islice(goal_cells(search), MOST_CELLS),
+        islice(decomposed(search), MOST_CHECKS),
+    ),
+    "decomposed": lambda search: (islice(decomposed(search), MOST_CHECKS),),
+    "miqp1": lambda search: (islice(thesis(search, "miqp1"), MOST_CHECKS),),
+    "miqp2": lambda search: (islice(thesis(search, "miqp2"), MOST_CHECKS),),
 }
+"""Families of proposals of each method, in the order in which they are tried."""
