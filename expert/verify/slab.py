@@ -128,12 +128,15 @@ class SlabFlood:
 
     def _enter(self, cell: Cell, shapes: np.ndarray, origin: Node | None, queue: deque[Node]) -> None:
         """Queue the components of a cell that touch any of the geometries."""
-        met = shapely.intersects(self.space.inner(cell).polygons[:, None], shapes[None]).any(axis=1)
+        polygons = self.space.inner(cell).polygons
+        fresh = [k for k in range(len(polygons)) if (cell, k) not in self.came_from]
+        if not fresh:
+            return
+        met = shapely.intersects(polygons[fresh][:, None], shapes[None]).any(axis=1)
         for k in np.flatnonzero(met):
-            node = (cell, int(k))
-            if node not in self.came_from:
-                self.came_from[node] = origin
-                queue.append(node)
+            node = (cell, fresh[k])
+            self.came_from[node] = origin
+            queue.append(node)
 
     def _matched(self, sources: Reached) -> Iterable[tuple[Cell, list[shapely.Geometry]]]:
         """Sources, by the cells of this ring whose orientations overlap theirs."""

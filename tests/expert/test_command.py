@@ -144,13 +144,19 @@ def test_draw_writes_the_picture(solution: Path, tmp_path: Path) -> None:
     assert (tmp_path / "slide.png").read_bytes().startswith(b"\x89PNG")
 
 
+def heed_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 def test_ctrl_c_ends_cleanly_and_leaves_files_alone(tmp_path: Path) -> None:
     endless, output = tmp_path / "endless.yaml", tmp_path / "s.json"
     text = (PROBLEMS / "transverse_wall_slide_pivot_two_fingers.yaml").read_text()
     endless.write_text(text.replace("gap: 0.001, time_limit: 60", "gap: 0.0, time_limit: 600"))
     output.write_text("precious")
     command = [sys.executable, "-m", "expert", "solve", str(endless), "-o", str(output)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    # a shell's background jobs, and their children, ignore Ctrl-C
+    with subprocess.Popen(command, **pipes, preexec_fn=heed_interrupts) as process:
         time.sleep(8)  # long enough to be at work, on a busy machine too
         assert process.poll() is None, process.communicate()
         process.send_signal(signal.SIGINT)

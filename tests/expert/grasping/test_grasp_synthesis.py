@@ -195,9 +195,8 @@ def test_three_fingers_hold_to_second_order() -> None:
 
 
 def test_nothing_found_is_said_to_be_no_proof() -> None:
-    first = np.radians([80, 60, 40, 20, 0.5])
-    task = GraspProblem(shape=quadrangle(0), pose=np.zeros(3), half_ranges=first)
-    answer = solve(task, time_limit=FOREVER)
+    wide = Gripper(fingers=(0, 1), opening=(10.0, 11.0))
+    answer = solve(problem(quadrangle(0), grippers=(wide,)), time_limit=FOREVER)
     assert answer.status == "none_found"
     assert "others may exist" in answer.reason
     assert not answer.found
