@@ -141,6 +141,7 @@ class _Differences(torch.autograd.Function):
     def forward(
         ctx: Any, knobs: Tensor, policy: ProposalPolicy, tasks: TaskBatch, loss: CalibrationLoss
     ) -> Tensor:
+        """The loss; a knob has a slope only where a step along it lowers the loss by what is worth a move."""
         here = knobs.detach().numpy().copy()
         value, slopes = loss.at(policy, tasks, here), np.zeros(len(here))
         for k in range(len(here)):

@@ -50,6 +50,37 @@ class Proposal:
     meetings: tuple[Meeting, ...] = ()
 
 
+Pairs = Sequence[tuple[int, int]]
+
+
+def join_pieces(m: LinearModel, pieces: int, H: IntArray, keys: Pairs, W: IntArray, pairs: Pairs) -> None:
+    """The pieces that meet, H (N, keys), are those in which the transport W (N, regions, pairs) enters and leaves.
+
+    keys: exit piece of an element and entry piece of the next; pairs: entry and exit piece of one element.
+    """
+    n = len(H)
+    exit_of, entry_of = (np.array([key[e] for key in keys]) for e in (0, 1))
+    entry, exit_ = (np.array([pair[e] for pair in pairs]) for e in (0, 1))
+    for c in range(pieces):
+        leaves, enters = H[:, exit_of == c], np.roll(H, 1, axis=0)[:, entry_of == c]
+        for joins, ends in ((leaves, exit_ == c), (enters, entry == c)):
+            m.equal([(1.0, joins), (-1.0, W[:, :, ends].reshape(n, -1))], np.zeros(n))
+
+
+def wind_once(m: LinearModel, W: IntArray, into: Array, out: Array) -> None:
+    """Winding number one about the start: directions of entry and exit (N, choices) go with the transport W (N, choices)."""
+    n = len(W)
+    turns = m.add((n,), -MOST_TURNS, MOST_TURNS, integral=True)
+    for sign in (1.0, -1.0):
+        gap: list[Term] = [
+            (sign * into, np.roll(W, -1, axis=0)),
+            (-sign * out, W),
+            (sign * 2 * np.pi, turns[:, None]),
+        ]
+        m.at_most(gap, np.full(n, np.pi - ANGLE_MARGIN))
+    m.equal([(1.0, turns)], 1.0)
+
+
 Part = Literal["entry", "exit", "both"]
 
 
@@ -141,13 +172,7 @@ class SweptModel:
                 m.at_most([(a, d[apart, k]), (-b, self.H[apart, k, None])], np.zeros(apart.sum()))
         for joined in np.flatnonzero(~apart):
             self._stay_on_wall(int(joined), keys)
-        exit_of, entry_of = (np.array([key[e] for key in keys]) for e in (0, 1))
-        entry, exit_ = (np.array([pair[e] for pair in self.pairs]) for e in (0, 1))
-        for c in range(len(self.geometry.pieces)):
-            leaves, enters = self.H[:, exit_of == c], np.roll(self.H, 1, axis=0)[:, entry_of == c]
-            for joins, ends in ((leaves, exit_ == c), (enters, entry == c)):
-                chosen = self.W[:, :, ends].reshape(n, -1)
-                m.equal([(1.0, joins), (-1.0, chosen)], np.zeros(n))
+        join_pieces(m, len(self.geometry.pieces), self.H, keys, self.W, self.pairs)
 
     def _stay_on_wall(self, c: int, keys: list[tuple[int, int]]) -> None:
         """Between its two points a wall's obstacle (segment - piece) is convex: same piece, same region."""
@@ -162,18 +187,9 @@ class SweptModel:
         m, n = self.milp, self.count
         alpha = self.geometry.directions
         entry, exit_ = (np.array([pair[e] for pair in self.pairs]) for e in (0, 1))
-        k = m.add((n,), -MOST_TURNS, MOST_TURNS, integral=True)
-        flat = self.W.reshape(n, -1)
-        into = np.broadcast_to(alpha[:, entry].reshape(1, -1), flat.shape)
-        out = np.broadcast_to(alpha[:, exit_].reshape(1, -1), flat.shape)
-        for sign in (1.0, -1.0):
-            gap: list[Term] = [
-                (sign * into, np.roll(flat, -1, axis=0)),
-                (-sign * out, flat),
-                (sign * 2 * np.pi, k[:, None]),
-            ]
-            m.at_most(gap, np.full(n, np.pi - ANGLE_MARGIN))
-        m.equal([(1.0, k)], 1.0)
+        into = np.broadcast_to(alpha[:, entry].reshape(1, -1), (n, alpha[:, entry].size))
+        out = np.broadcast_to(alpha[:, exit_].reshape(1, -1), into.shape)
+        wind_once(m, self.W.reshape(n, -1), into, out)
 
     def _fill(self, end: int, hub: int) -> None:
         """At a limit each triangle has a point y in the pieces named for it: R^T (p - y) in the piece, W deciding which."""

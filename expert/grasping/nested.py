@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from expert.caging.model import ANGLE_MARGIN, triangles
+from expert.caging.model import join_pieces, triangles, wind_once
 from expert.caging.swept import SweptGeometry, cleaned, swept_inside
 from expert.geometry.convex import Region
 from expert.geometry.cover import clip, half_planes
@@ -199,30 +199,14 @@ class NestedCages:
             for q, key in enumerate(self.keys):
                 for a, b in zip(*self.overlaps[k][key], strict=True):
                     m.at_most([(a, d[:, q]), (-b, self.H[:, q, None])], np.zeros(n))
-        exit_of, entry_of = (np.array([key[e] for key in self.keys]) for e in (0, 1))
-        entry, exit_ = (np.array([pair[e] for pair in self.pairs]) for e in (0, 1))
-        for c in range(len(self.geometry.pieces)):
-            leaves, enters = self.H[:, exit_of == c], np.roll(self.H, 1, axis=0)[:, entry_of == c]
-            for joins, ends in ((leaves, exit_ == c), (enters, entry == c)):
-                chosen = self.W[:, :, ends].reshape(n, -1)
-                m.equal([(1.0, joins), (-1.0, chosen)], np.zeros(n))
+        join_pieces(m, len(self.geometry.pieces), self.H, self.keys, self.W, self.pairs)
 
     def _winding(self) -> None:
         """Configuration enclosing (5-CT5): the loop winds once around the goal."""
-        m, n = self.milp, self.count
-        turns = m.add((n,), -2, 2, integral=True)
-        alpha = self.geometry.directions[self.facets]
+        n, alpha = self.count, self.geometry.directions[self.facets]
         entry, exit_ = (np.array([pair[e] for pair in self.pairs]) for e in (0, 1))
         into, out = (np.broadcast_to(alpha[:, e], self.W.shape).reshape(n, -1) for e in (entry, exit_))
-        flat = self.W.reshape(n, -1)
-        for sign in (1.0, -1.0):
-            gap: list[Term] = [
-                (sign * into, np.roll(flat, -1, axis=0)),
-                (-sign * out, flat),
-                (sign * 2 * np.pi, turns[:, None]),
-            ]
-            m.at_most(gap, np.full(n, np.pi - ANGLE_MARGIN))
-        m.equal([(1.0, turns)], 1.0)
+        wind_once(self.milp, self.W.reshape(n, -1), into, out)
 
     def _limits(self) -> None:
         """Limit orientations (5-CT7, 8, 12, 15): a filled loop at all angles from which the object is shut out."""

@@ -107,15 +107,22 @@ def _one_sign(c: Array) -> bool:
 
 
 @numba.njit(cache=True)
-def null_vectors(normals: Array, m: int, out: Array) -> int:
-    """Write a basis of {lambda: sum lambda n = 0} for m normals (m, 2) to rows of `out` (., 4); returns its size, m - rank."""
-    out[:] = 0.0
+def _least_parallel(normals: Array, m: int) -> tuple[int, int, float]:
+    """The two of m normals with the largest cross product, and that."""
     bi, bj, best = 0, 0, 0.0
     for i in range(m):
         for j in range(i + 1, m):
-            c = normals[i, 0] * normals[j, 1] - normals[i, 1] * normals[j, 0]
-            if abs(c) > abs(best):
-                bi, bj, best = i, j, c
+            cross = normals[i, 0] * normals[j, 1] - normals[i, 1] * normals[j, 0]
+            if abs(cross) > abs(best):
+                bi, bj, best = i, j, cross
+    return bi, bj, best
+
+
+@numba.njit(cache=True)
+def null_vectors(normals: Array, m: int, out: Array) -> int:
+    """Write a basis of {lambda: sum lambda n = 0} for m normals (m, 2) to rows of `out` (., 4); returns its size, m - rank."""
+    out[:] = 0.0
+    bi, bj, best = _least_parallel(normals, m)
     count = 0
     if abs(best) <= PARALLEL:
         for k in range(1, m):
@@ -261,12 +268,7 @@ def _place(
         world[a, 0] = c * normals[j, 0] - s * normals[j, 1]
         world[a, 1] = s * normals[j, 0] + c * normals[j, 1]
         right[a] = world[a, 0] * fingers[n, 0] + world[a, 1] * fingers[n, 1] - offsets[j]
-    bi, bj, best = 0, 0, 0.0
-    for a in range(m):
-        for b in range(a + 1, m):
-            cross = world[a, 0] * world[b, 1] - world[a, 1] * world[b, 0]
-            if abs(cross) > abs(best):
-                bi, bj, best = a, b, cross
+    bi, bj, best = _least_parallel(world, m)
     row[12:14] = 0.0
     if abs(best) <= PARALLEL:
         row[2], row[3] = right[0] * world[0, 0], right[0] * world[0, 1]
