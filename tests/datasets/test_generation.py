@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -60,9 +61,10 @@ def test_a_job_killed_twice_ends_with_the_bytes_of_an_undisturbed_one(
 def test_ctrl_c_stops_cleanly_and_says_how_to_go_on(tmp_path: Path) -> None:
     out = tmp_path / "interrupted"
     many = [*COMMAND, "dataset.count=200", "dataset.shard=1", f"out={out}", "jobs=2"]
-    job = subprocess.Popen(
-        many, start_new_session=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    # a shell's background jobs, and their children, ignore Ctrl-C
+    heed = partial(signal.signal, signal.SIGINT, signal.default_int_handler)
+    job = subprocess.Popen(many, start_new_session=True, preexec_fn=heed, **pipes)
     while job.poll() is None and not list(out.glob("shards/*.npz")):
         time.sleep(0.01)
     os.killpg(job.pid, signal.SIGINT)
