@@ -58,10 +58,7 @@ def _closing(path: FingerPath) -> tuple[np.ndarray, Array]:
     after = (facet[None] == (facet[:, None] + 1) % count) & facets.reflex[facet][None]
     compatible = (finger[:, None] != finger[None]) | after | after.T
     events = np.empty((MOST, COLUMNS))
-    found = closing_contacts(
-        contacts, compatible, facets.normals, facets.offsets, facets.starts, facets.tangents, facets.lengths,
-        np.ascontiguousarray(path.knots), events,
-    )  # fmt: skip
+    found = closing_contacts(contacts, compatible, facets, np.ascontiguousarray(path.knots), events)
     if found == MOST:
         raise SolverFailed(f"more than {MOST} dead ends: the finger path is degenerate")
     return contacts, events[:found]

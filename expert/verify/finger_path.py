@@ -6,6 +6,7 @@ Configurations are (x, y, theta) relative to the goal; s in [0, K - 1] is the pa
 import itertools
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -115,11 +116,11 @@ def _chord_depth(vertices: Array, p: Array, q: Array) -> Array:
     return -np.minimum(signed_distance(vertices, points), 0.0).min(axis=(1, 2))
 
 
-@dataclass(frozen=True)
-class Facets:
+class Facets(NamedTuple):
     """Outside facet j is {y : normal_j . y >= offset_j}; facets run from start by length along tangent.
 
     reflex (V,): whether the corner at the start of facet j is reflex, so that one finger can touch facets j - 1 and j.
+    A tuple, which compiled loops take as it is.
     """
 
     normals: Array

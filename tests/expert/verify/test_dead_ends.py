@@ -8,8 +8,8 @@ from expert.caging.shapes import named_shape, random_polygon
 from expert.geometry.pose import Array
 from expert.grasping.sweeping import sweep
 from expert.verify.dead_ends import DeadEndEvent, dead_end_events
-from expert.verify.event_kernel import roots_in_unit
 from expert.verify.finger_path import FingerPath
+from expert.verify.unit_roots import roots_in_unit
 from tests.expert.verify.grasps import closing_in, mirrored, moved, some_shape, turned
 
 BOX = np.array([[-2.0, -1.0], [2.0, -1.0], [2.0, 1.0], [-2.0, 1.0]])
