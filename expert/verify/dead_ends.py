@@ -13,6 +13,8 @@ from expert.verify.finger_path import FingerPath
 
 AT_GOAL = 1e-6
 """An end this close to the goal, in relative lengths and rad, is the goal."""
+STRICT = 1e-6
+"""Contacts that meet all conditions by this, in relative lengths and weights, do so whatever the rounding."""
 MOST = 20_000
 
 
@@ -21,13 +23,15 @@ class DeadEndEvent:
     """At path parameter s the free space around `first` to `last` vanishes.
 
     first, last: relative configurations (3,) between which the object can still slide at that moment; equal where it
-    cannot.  contacts: (finger, facet) pairs that close.
+    cannot.  contacts: (finger, facet) pairs that close.  strict: whether they do beyond all tolerances; an event that is not
+    may be none.
     """
 
     s: float
     first: Array
     last: Array
     contacts: tuple[tuple[int, int], ...]
+    strict: bool
 
     def configurations(self, count: int) -> Array:
         """So many configurations (count, 3) from the first to the last."""
@@ -102,7 +106,14 @@ def _dead_end(
 ) -> DeadEndEvent:
     ends = [np.array([*(row[2:4] + t * row[12:14]), row[4]]) for t in interval]
     touched = tuple((int(i), int(j)) for i, j in contacts[row[7:11][row[7:11] >= 0].astype(int)])
-    return DeadEndEvent(s=float(row[0] + row[1]), first=ends[0], last=ends[1], contacts=touched)
+    long = np.isnan(row[5]) or interval[1] - interval[0] > 10 * STRICT  # or only ends of facets touch
+    return DeadEndEvent(
+        s=float(row[0] + row[1]),
+        first=ends[0],
+        last=ends[1],
+        contacts=touched,
+        strict=bool(long and row[14] > STRICT),
+    )
 
 
 def _is_passed(path: FingerPath, end: DeadEndEvent) -> bool:
@@ -115,8 +126,9 @@ def _is_passed(path: FingerPath, end: DeadEndEvent) -> bool:
 
 
 def _distinct(ends: list[DeadEndEvent]) -> list[DeadEndEvent]:
+    """In order of s; of those that are the same, a strict one if there is one."""
     kept: list[DeadEndEvent] = []
-    for end in sorted(ends, key=lambda e: e.s):
+    for end in sorted(ends, key=lambda e: not e.strict):
         same = (
             abs(end.s - k.s) < 1e-7
             and np.abs(end.first - k.first).max() < 1e-6
@@ -125,4 +137,4 @@ def _distinct(ends: list[DeadEndEvent]) -> list[DeadEndEvent]:
         )
         if not any(same):
             kept.append(end)
-    return kept
+    return sorted(kept, key=lambda e: e.s)

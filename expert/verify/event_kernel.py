@@ -20,9 +20,10 @@ from expert.verify.closing_equations import (
 from expert.verify.finger_path import Facets
 
 TOUCH = 1e-7
-"""A contact may miss its facet, or another finger enter the object, by this relative length."""
-COLUMNS = 14
-"""Of an event: segment, fraction, x, y, angle, slide from, slide to (nan: none), four contacts (-1: none), rate, slide direction."""
+"""A contact may miss its facet, or another finger enter the object, by this relative length, and a weight be so negative."""
+COLUMNS = 15
+"""Of an event: segment, fraction, x, y, angle, slide from, slide to (nan: none), four contacts (-1: none), rate, slide
+direction, and by how much weights, closing rate and (without a slide) places on facets keep clear of their limits."""
 
 
 @numba.njit(cache=True)
@@ -129,7 +130,8 @@ def _on_facets(chosen: np.ndarray, facets: Facets, fingers: Array, row: Array) -
         along = tx * (fingers[n, 0] - row[2]) + ty * (fingers[n, 1] - row[3])
         along -= tangent[0] * start[0] + tangent[1] * start[1]
         if not slides:
-            if along < -TOUCH or along > length + TOUCH:
+            row[14] = min(row[14], along, length - along)
+            if row[14] < -TOUCH:
                 return False
         elif tx * row[12] + ty * row[13] > 0:  # along falls as the object slides on
             low, high = max(low, along - length), min(high, along)
@@ -161,5 +163,7 @@ def _closes(chosen: np.ndarray, null: Array, facets: Facets, segment: Array, row
     total = np.abs(weights).sum()
     if total <= ROUND:
         return False  # all lines of force meet: fewer contacts balance, and are a set of their own
+    least = (sign * weights).min() / total
     row[11] = sign * (first * rates[0] + second * rates[1]) / total
-    return (sign * weights).min() >= -1e-7 * total and row[11] <= ROUND
+    row[14] = min(least, -row[11])
+    return least >= -TOUCH and row[11] <= ROUND

@@ -228,7 +228,7 @@ class _Check:
         poses = self.path.frame.world_pose(places)
         untouched = self.path.deepest(places, 0.0, event.s) <= TOUCH
         known = self.start.contains(poses) if self.start else np.zeros(len(poses), bool)
-        sure = np.flatnonzero(untouched & known)
+        sure = np.flatnonzero(untouched & known & event.strict)
         pose = poses[sure[0]] if len(sure) else poses[len(poses) // 2]
         return DeadEnd(s=event.s, pose=pose, contacts=event.contacts, witness=pose if len(sure) else None)
 

@@ -8,8 +8,10 @@ from expert.caging.shapes import named_shape, random_polygon
 from expert.geometry.pose import Array
 from expert.grasping.sweeping import sweep
 from expert.verify.dead_ends import DeadEndEvent, dead_end_events
+from expert.verify.event_kernel import TOUCH
 from expert.verify.finger_path import FingerPath
 from expert.verify.unit_roots import roots_in_unit
+from tests.expert.grasping.experiments import closing_path
 from tests.expert.verify.grasps import closing_in, mirrored, moved, some_shape, turned
 
 BOX = np.array([[-2.0, -1.0], [2.0, -1.0], [2.0, 1.0], [-2.0, 1.0]])
@@ -119,6 +121,22 @@ def test_every_stall_of_random_paths_is_a_listed_dead_end() -> None:
             stalls += 1
         paths += 1
     assert stalls >= 50
+
+
+@pytest.mark.parametrize("seed", [0, 6, 7, 24])
+def test_objects_that_wait_at_a_strict_dead_end_stall_there(seed: int) -> None:
+    shape, knots, _ = closing_path(seed)
+    path = FingerPath(shape, STILL, knots)
+    waiting = {True: 0, False: 0}
+    for event in dead_end_events(path):
+        place = event.inner_configurations(1)
+        if path.deepest(place, 0.0, event.s)[0] > TOUCH:
+            continue  # a finger moves it away before
+        stalled = sweep(shape, knots, path.frame.world_pose(place)).stalled[0]
+        waiting[event.strict] += 1
+        assert not event.strict or stalled == pytest.approx(event.s, abs=1e-3)
+    assert waiting[True] > 0
+    assert (waiting[False] > 0) == (seed != 7)  # where facets would meet only at an end: some do not stall
 
 
 def _free_starts(path: FingerPath, rng: np.random.Generator, count: int) -> Array:
