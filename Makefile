@@ -52,7 +52,7 @@ gallery: setup
 		for ending in png gif; do $(BIN)/python -m expert draw build/$$name.json -o docs/gallery/$$name.$$ending; done; \
 	done
 
-# Pictures of cages in docs/gallery.md (Fig. 5-14 to 5-17): solve, verify and draw.
+# Pictures of cages and grasps in docs/gallery.md (Fig. 5-14 to 5-17, 5-28 to 5-31): solve, verify and draw.
 CAGES := random_03 random_05 random_09 t_wall hourglass_wall t_grippers m_grippers hourglass_grippers \
 	hooks_3 hooks_4 hourglass_min hourglass_max m_min m_tripod t_tripod
 figures: setup
@@ -61,6 +61,14 @@ figures: setup
 		$(BIN)/python -m expert solve configs/problem/cage/$$name.yaml -o build/$$name.json || exit 1; \
 		$(BIN)/python -m expert verify build/$$name.json || exit 1; \
 		$(BIN)/python -m expert draw build/$$name.json -o docs/gallery/cage_$$name.png || exit 1; \
+	done
+	@for name in t hourglass random_06_3; do echo "== grasp $$name"; \
+		$(BIN)/python -m expert solve configs/problem/certified_grasp/$$name.yaml -o build/$$name.json || exit 1; \
+		$(BIN)/python -m expert verify build/$$name.json || exit 1; \
+		for ending in png gif; do $(BIN)/python -m expert draw build/$$name.json -o docs/gallery/grasp_$$name.$$ending || exit 1; done; \
+	done
+	@for name in 28_random 29_overlays 30_attraction 31_force_closure; do echo "== figure 5-$$name"; \
+		$(BIN)/python -m expert.drawing.grasp_figures 5-$${name%%_*} -o docs/gallery/grasp_$${name#*_}.png || exit 1; \
 	done
 
 clean:

@@ -35,6 +35,8 @@ from expert.verify.start_set import StartSet
 
 RANDOM, NAMED, METHODS = 12, ("T", "hourglass", "M", "I"), ("miqp1", "miqp2", "goal_cell")
 RUNS, COMPARED = 60, 100
+DISTANCE, ANGLE = 1e-5, np.radians(0.01)
+"""An end this near to the goal, over the object's diameter and in rad, is there."""
 TIME_LIMIT = 300.0
 """Of the clock, for one object [s]."""
 REACH = 0.2
@@ -75,17 +77,19 @@ def random_polygons() -> tuple[Figure, dict[str, Any]]:
             continue
         runs = executions(task, answer, RUNS)
         draw_starts(axes, task, answer, runs)
+        _square(axes)
         off, turned = runs.misses(task.pose)
+        arrived = int(((off <= DISTANCE * task.shape.size) & (turned <= ANGLE)).sum())
         rows[-1] |= {
-            "worst_distance": float(off.max() / task.shape.size),
-            "worst_angle_deg": _deg(turned.max()),
-        }
-        axes.set_title(f"{name}: ends within {off.max() / task.shape.size:.0e}", fontsize=8)
+            "runs": RUNS, "arrived": arrived,
+            "worst_distance": float(off.max() / task.shape.size), "worst_angle_deg": _deg(turned.max()),
+        }  # fmt: skip
+        axes.set_title(f"{name}: {arrived} of {RUNS} starts end at the goal", fontsize=8)
     return figure, {"figure": "5-28", "rows": rows}
 
 
 def overlays() -> tuple[Figure, dict[str, Any]]:
-    """Fig. 5-29: ten executions of four objects, knot by knot."""
+    """Fig. 5-29: executions of four objects on top of each other, knot by knot."""
     figure, rows = new_figure(10, 8.2), []
     grid = figure.subplots(len(NAMED), 5)
     for line, name in zip(grid, _watched(NAMED, "5-29"), strict=True):
@@ -98,7 +102,10 @@ def overlays() -> tuple[Figure, dict[str, Any]]:
         runs = executions(task, answer, RUNS)
         for k, axes in enumerate(line):
             draw_moment(axes, task, answer, runs, float(k))
+            _square(axes)
         line[0].set_ylabel(name, fontsize=9)
+    for k, axes in enumerate(grid[0]):
+        axes.set_title(f"knot {k}", fontsize=8)
     return figure, {"figure": "5-29", "rows": rows}
 
 
@@ -213,6 +220,13 @@ def _unsolved(axes: Axes, name: str, answer: GraspSolution) -> bool:
     axes.set_axis_off()
     axes.set_title(f"{name}: {answer.status}", fontsize=8)
     return True
+
+
+def _square(axes: Axes) -> None:
+    """Make a panel's view a square about its middle, so that all panels are of one size."""
+    low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
+    middle, half = 0.5 * (low + high), 0.5 * (high - low).max()
+    plain_axes(axes, middle - half, middle + half)
 
 
 def _watched(items: Iterable[Any], what: str) -> Iterable[Any]:

@@ -15,7 +15,7 @@ from expert.verify.finger_path import FingerPath
 from expert.verify.grasp import verify, verify_grasp
 from expert.verify.grasp_report import Cages, DeadEnds, EndGrasp, GraspReport
 from expert.verify.start_set import StartSet
-from tests.expert.verify.grasps import mirrored, moved, problem_of, shrinking_path, some_shape, turned
+from tests.expert.verify.grasps import mirrored, moved, problem_of, shrinking_case, turned
 
 BOX = np.array([[-0.05, -0.03], [0.05, -0.03], [0.05, 0.03], [-0.05, 0.03]])
 CONTACTS = np.array([[0.02, -0.03], [0.05, -0.015], [-0.02, 0.03], [-0.05, 0.015]])
@@ -46,12 +46,6 @@ def parts(report: GraspReport) -> tuple[Cages, DeadEnds, EndGrasp, StartSet]:
     return report.cages, report.dead_ends, report.end, report.start
 
 
-def seeded(seed: int) -> tuple[GraspProblem, Array]:
-    rng = np.random.default_rng(seed)
-    vertices = some_shape(rng, seed)
-    return problem_of(vertices), shrinking_path(vertices, rng)
-
-
 def test_four_fingers_that_close_on_a_box_are_certified_in_all_parts() -> None:
     report = verify_grasp(box_problem(), CLOSING, FACETS)
     assert report.certified, report.reason
@@ -66,7 +60,7 @@ def test_four_fingers_that_close_on_a_box_are_certified_in_all_parts() -> None:
 
 @pytest.mark.parametrize("seed", CERTIFIED)
 def test_all_starts_of_a_certified_grasp_end_at_the_goal(seed: int) -> None:
-    problem, path = seeded(seed)
+    problem, path = shrinking_case(seed)
     report = verify_grasp(problem, path)
     assert report.certified
     start = parts(report)[3]
@@ -81,7 +75,7 @@ def test_all_starts_of_a_certified_grasp_end_at_the_goal(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", JAMMING)
 def test_nested_cages_that_jam_are_refuted_by_a_start_that_does(seed: int) -> None:
-    problem, path = seeded(seed)
+    problem, path = shrinking_case(seed)
     report = verify_grasp(problem, path)
     cages, dead_ends, end, start = parts(report)
     assert cages.held  # all that the thesis asks for
@@ -96,7 +90,7 @@ def test_nested_cages_that_jam_are_refuted_by_a_start_that_does(seed: int) -> No
 
 @pytest.mark.parametrize("seed", JAMMING)
 def test_random_starts_that_stall_do_so_at_listed_dead_ends(seed: int) -> None:
-    problem, path = seeded(seed)
+    problem, path = shrinking_case(seed)
     report = verify_grasp(problem, path)
     _, dead_ends, _, start = parts(report)
     run = sweep(problem.shape, path, start.starts(np.random.default_rng(0), 60))
@@ -109,7 +103,7 @@ def test_random_starts_that_stall_do_so_at_listed_dead_ends(seed: int) -> None:
 def test_verdicts_survive_motion_mirror_images_and_scaling() -> None:
     pose = np.array([0.4, -1.0, 2.0])
     for seed, verdict in ((CERTIFIED[0], "certified"), (JAMMING[0], "refuted")):
-        problem, path = seeded(seed)
+        problem, path = shrinking_case(seed)
         v = problem.shape.vertices
         copies = (
             (problem_of(v, pose), moved(path, pose)),

@@ -1,0 +1,114 @@
+"""What the benchmarks of grasping share: objects, their certified grasps, and the command line that prints tables and bars."""
+
+import argparse
+import json
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from expert.files.certified_grasp import schedule
+from expert.geometry.pose import Array
+from expert.grasping.problem import GraspProblem, GraspSolution, Shape
+from expert.grasping.shapes import NAMES, grasp_shape, irregular_polygon
+from expert.grasping.synthesis import solve
+
+QUIET = Console(stderr=True)
+TIME_LIMIT = 300.0
+"""Of the clock [s]: generous, so that other load does not count."""
+DISTANCE, ANGLE = 1e-5, 0.01
+"""An end this near to the goal, over the object's size and in degrees, is there."""
+Row = dict[str, Any]
+Bars = dict[str, bool]
+
+
+class Study:
+    """Objects, and certified grasps found so far: later parts use what the first has found."""
+
+    def __init__(self, quick: bool) -> None:
+        self.quick = quick
+        numbers = range(3) if quick else range(12)
+        self.random = {
+            f"polygon {k}": irregular_polygon(np.random.default_rng(k), 4 + k % 3) for k in numbers
+        }
+        self.named = {name: grasp_shape(name) for name in (NAMES[:2] if quick else NAMES)}
+        self.found: dict[tuple[str, float], tuple[GraspProblem, GraspSolution]] = {}
+        self.seconds: dict[tuple[str, float], float] = {}
+
+    @property
+    def objects(self) -> dict[str, Array]:
+        """All of them by name, vertices (V, 2)."""
+        return {**self.named, **self.random}
+
+    def grasp(self, name: str, degrees: float = 15.0) -> tuple[GraspProblem, GraspSolution]:
+        """The answer for one object, solved once."""
+        if (name, degrees) not in self.found:
+            problem = task(self.objects[name], degrees)
+            began = time.process_time()
+            self.found[name, degrees] = problem, solve(problem, time_limit=TIME_LIMIT)
+            self.seconds[name, degrees] = time.process_time() - began
+        return self.found[name, degrees]
+
+    def certified(self) -> list[tuple[str, GraspProblem, GraspSolution]]:
+        """Objects with a certified grasp at 15 deg."""
+        answers = [(name, *self.grasp(name)) for name in watched(self.objects, "solving")]
+        return [row for row in answers if row[2].found]
+
+
+Part = Callable[[Study], tuple[list[Row], Bars]]
+
+
+def task(vertices: Array, degrees: float = 15.0, **options: Any) -> GraspProblem:
+    """The object at the origin."""
+    ranges = np.radians(schedule(degrees))
+    return GraspProblem(shape=Shape(vertices=vertices), pose=np.zeros(3), half_ranges=ranges, **options)
+
+
+def watched(items: Iterable[Any], what: str, total: int | None = None) -> Iterable[Any]:
+    """The items, with a bar of progress where somebody looks; total: how many, where they have no length."""
+    return track(items, what, total, console=QUIET, disable=not QUIET.is_terminal)
+
+
+def run(parts: dict[str, Part], text: str) -> int:
+    """Read the command line, run the parts asked for, and return 1 where a bar is missed."""
+    parser = argparse.ArgumentParser(description=text.splitlines()[0])
+    parser.add_argument("--quick", action="store_true", help="few objects, few starts")
+    parser.add_argument("--only", nargs="+", choices=parts, help="these parts alone")
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    study = Study(options.quick)
+    result: dict[str, dict[str, Any]] = {}
+    for name in options.only or parts:
+        began = time.process_time()
+        rows, bars = parts[name](study)
+        seconds = time.process_time() - began
+        result[name] = {"rows": rows, "bars": bars, "seconds": seconds}
+        _print(f"{name}, {seconds:.0f} s", rows, bars)
+        if options.json:
+            options.json.write_text(json.dumps(result, indent=1, default=float))
+    return 0 if all(met for part in result.values() for met in part["bars"].values()) else 1
+
+
+def _print(title: str, rows: list[Row], bars: Bars) -> None:
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    table = Table(title=title)
+    for column in columns:
+        table.add_column(column)
+    for row in rows:
+        table.add_row(*(_cell(row.get(column)) for column in columns))
+    Console(width=200).print(table)
+    for bar, met in bars.items():
+        print(f"{'met   ' if met else 'MISSED'}  {bar}")
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, dict):
+        return " ".join(_cell(v) for v in value.values())
+    if isinstance(value, float):
+        return f"{value:.3g}"
+    return "" if value is None else str(value)
