@@ -4,6 +4,7 @@ import argparse
 import json
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,12 @@ from rich.progress import track
 from rich.table import Table
 
 from expert.files.certified_grasp import schedule
-from expert.geometry.pose import Array
+from expert.geometry.pose import Array, to_world
 from expert.grasping.problem import GraspProblem, GraspSolution, Shape
 from expert.grasping.shapes import NAMES, grasp_shape, irregular_polygon
 from expert.grasping.synthesis import solve
+from expert.verify.grasp import verify_grasp
+from expert.verify.grasp_report import GraspReport
 
 QUIET = Console(stderr=True)
 TIME_LIMIT = 300.0
@@ -67,6 +70,14 @@ def task(vertices: Array, degrees: float = 15.0, **options: Any) -> GraspProblem
     """The object at the origin."""
     ranges = np.radians(schedule(degrees))
     return GraspProblem(shape=Shape(vertices=vertices), pose=np.zeros(3), half_ranges=ranges, **options)
+
+
+def moved_report(problem: GraspProblem, answer: GraspSolution) -> GraspReport:
+    """The checker's report on everything moved rigidly."""
+    motion = np.array([0.3, -0.1, 0.7])
+    origin = to_world(motion, problem.pose[None, :2])[0]
+    moved = replace(problem, pose=np.append(origin, problem.pose[2] + motion[2]))
+    return verify_grasp(moved, to_world(motion, answer.path), answer.facets)
 
 
 def watched(items: Iterable[Any], what: str, total: int | None = None) -> Iterable[Any]:

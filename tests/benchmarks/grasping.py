@@ -11,19 +11,14 @@ executions     500 random starts of each certified object, and its hard ones: al
 
 import sys
 import time
-from dataclasses import replace
 
 import numpy as np
 
 from expert.geometry.polygon import mass_properties
-from expert.geometry.pose import to_world
-from expert.grasping.problem import GraspProblem, GraspSolution
 from expert.grasping.sweeping import sweep
 from expert.verify.finger_path import FingerPath
-from expert.verify.grasp import verify_grasp
-from expert.verify.grasp_report import GraspReport
 from expert.verify.start_set import StartSet
-from tests.benchmarks._grasp_study import ANGLE, DISTANCE, Bars, Part, Row, Study, run, watched
+from tests.benchmarks._grasp_study import ANGLE, DISTANCE, Bars, Part, Row, Study, moved_report, run, watched
 from tests.expert.grasping.experiments import hard_starts
 
 MEDIAN_BAR, MAX_BAR, DEAD_END_BAR, WIDE_BAR = 5.0, 30.0, 2.0, 10 / 12
@@ -50,14 +45,6 @@ def _certificate(study: Study, name: str, degrees: float) -> Row:
         area = report.start.area if report.start else 0.0
         row["area"] = area / mass_properties(problem.shape.vertices).area
     return row
-
-
-def moved_report(problem: GraspProblem, answer: GraspSolution) -> GraspReport:
-    """The checker's report on everything moved rigidly."""
-    motion = np.array([0.3, -0.1, 0.7])
-    origin = to_world(motion, problem.pose[None, :2])[0]
-    moved = replace(problem, pose=np.append(origin, problem.pose[2] + motion[2]))
-    return verify_grasp(moved, to_world(motion, answer.path), answer.facets)
 
 
 def _certificate_bars(rows: list[Row]) -> Bars:

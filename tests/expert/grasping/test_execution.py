@@ -10,8 +10,10 @@ from expert.grasping.shapes import grasp_shape, irregular_polygon
 from expert.grasping.sweeping import sweep
 from expert.grasping.synthesis import solve
 from expert.verify.finger_path import FingerPath
+from expert.verify.grasp import verify_grasp
 from expert.verify.start_set import StartSet
 from tests.expert.grasping.experiments import hard_starts
+from tests.expert.verify.grasps import shrinking_case
 
 Certified = tuple[GraspProblem, GraspSolution, StartSet]
 TOLERANCE, ANGLE = 1e-5, np.radians(0.01)
@@ -74,3 +76,22 @@ def test_mujoco_arrives_too(certified: Certified) -> None:
     end = replay_grasp_in_mujoco(problem, answer.path, start)[-1] - problem.pose
     assert np.linalg.norm(end[:2]) <= 2e-3 * problem.shape.size
     assert abs(end[2]) <= np.radians(0.3)
+
+
+@pytest.mark.parametrize("seed", [21, 112, 321])
+def test_what_jams_in_the_sweeping_process_jams_in_the_contact_simulator(seed: int) -> None:
+    """Nested cages with a form-closed end: the checker's witness is held elsewhere, though other starts do arrive."""
+    problem, path = shrinking_case(seed)
+    report = verify_grasp(problem, path)
+    assert report.verdict == "refuted"
+    assert report.dead_ends
+    assert report.start
+    starts = report.start.starts(np.random.default_rng(0), 20)
+    arriving = starts[np.isnan(sweep(problem.shape, path, starts).stalled)][:1]
+    assert report.dead_ends.witness is not None
+    ends = replay_grasp(problem, path, np.stack([report.dead_ends.witness, *arriving]))[:, -1] - problem.pose
+    jams, arrives = np.linalg.norm(ends[:, :2], axis=1) / problem.shape.size
+    assert jams > 0.01
+    assert abs(ends[0, 2]) > np.radians(2)
+    assert arrives < 1e-3
+    assert abs(ends[1, 2]) < np.radians(0.1)
