@@ -66,13 +66,7 @@ def stages_of(cfg: DictConfig) -> dict[str, Stage]:
 
 def read_tasks(cfg: DictConfig) -> dict[str, TaskBatch]:
     """All data sets; of the training set the first `train_tasks`, if that is a number."""
-    tasks = read_all(cfg.data)
-    if cfg.train_tasks is not None:
-        total = len(tasks["train"])
-        fits = isinstance(cfg.train_tasks, int) and 2 <= cfg.train_tasks <= total
-        require(fits, "train_tasks", f"a whole number from 2 to {total}", cfg.train_tasks)
-        tasks["train"] = tasks["train"][torch.arange(cfg.train_tasks)]
-    return tasks
+    return read_all(cfg.data, train_tasks=cfg.train_tasks)
 
 
 def train_side_by_side(cfg: DictConfig, runs: Sequence[DictConfig], stages: Sequence[Stage]) -> None:

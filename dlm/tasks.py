@@ -50,10 +50,13 @@ class TaskBatch:
         )
 
     @classmethod
-    def read(cls, folder: str | Path) -> "TaskBatch":
-        """A whole data set.  Raises InvalidProblem where it is missing, unfinished, empty or damaged."""
+    def read(cls, folder: str | Path, count: int | None = None) -> "TaskBatch":
+        """A data set, or its first `count` tasks.  Raises InvalidProblem where it is missing, unfinished, empty, damaged, or smaller."""
         data = read_dataset(folder)
-        return cls.of([data[i] for i in range(len(data))], data.sha256)
+        if count is not None:
+            fits = isinstance(count, int) and 2 <= count <= len(data)
+            require(fits, "train_tasks", f"a whole number from 2 to {len(data)}", count)
+        return cls.of([data[i] for i in range(len(data) if count is None else count)], data.sha256)
 
     def __len__(self) -> int:
         return len(self.samples)
@@ -79,7 +82,8 @@ class TaskBatch:
         return torch.from_numpy(self.scenes.desired)
 
 
-def read_all(folders: Mapping[str, str | Path]) -> dict[str, TaskBatch]:
-    """Several data sets by name; a folder that is named twice is read once."""
-    read = {folder: TaskBatch.read(folder) for folder in dict.fromkeys(folders.values())}
-    return {name: read[folder] for name, folder in folders.items()}
+def read_all(folders: Mapping[str, str | Path], *, train_tasks: int | None = None) -> dict[str, TaskBatch]:
+    """Several data sets by name, of `train` the first so many tasks; what is named twice is read once."""
+    wanted = {name: (folder, train_tasks if name == "train" else None) for name, folder in folders.items()}
+    read = {part: TaskBatch.read(*part) for part in dict.fromkeys(wanted.values())}
+    return {name: read[part] for name, part in wanted.items()}

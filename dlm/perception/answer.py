@@ -33,7 +33,8 @@ def answer(
     first = int(low[outline[0, low, 0].argmin()])
     outline = np.roll(outline, -first, axis=1)
     centres = np.array([mass_properties(corners).centroid for corners in outline])
-    poses = np.column_stack([centres, scene.motion[:, 2]])
+    # The fit may end whole turns away; from step to step the object takes the shorter way.
+    poses = np.column_stack([centres, np.unwrap(scene.motion[:, 2])])
     return Perceived(
         vertices=to_body(poses[0], outline[0]),
         poses=poses,

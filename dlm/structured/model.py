@@ -137,7 +137,7 @@ class StructuredModel:
         status: Status = "planned"
         reason = ""
         if answer.risk > self.planner.acceptable:
-            status, reason = "risky", f"in trial simulations its loss is {answer.risk:.2g} cm^2 on average"
+            status, reason = "risky", f"in trial simulations it fails, with a risk of {answer.risk:.2g} cm^2"
         if perceived.status != "ok":
             status, reason = "poor_fit", perceived.reason
         return Planned(
