@@ -51,11 +51,11 @@ def some_shape(rng: np.random.Generator, k: int) -> Array:
     return random_polygon(rng, int(rng.integers(4, 8)))
 
 
-def shrinking_case(seed: int) -> tuple[GraspProblem, Array]:
-    """A problem with the half-ranges WIDE, and a path with shrinking cages, nested or not."""
+def shrinking_case(seed: int, half_ranges: Array = WIDE) -> tuple[GraspProblem, Array]:
+    """A problem with these half-ranges [rad], and a path whose cages shrink, nested or not."""
     rng = np.random.default_rng(seed)
     vertices = some_shape(rng, seed)
-    return problem_of(vertices), shrinking_path(vertices, rng)
+    return problem_of(vertices, half_ranges=half_ranges), shrinking_path(vertices, rng)
 
 
 def problem_of(vertices: Array, pose: object = (0, 0, 0), half_ranges: Array = WIDE) -> GraspProblem:
