@@ -12,7 +12,7 @@ outer shape   the hull of R(+-h) v and v / cos h over the corners v: every arc o
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -78,19 +78,26 @@ class CellComplex:
     """Free components of the cells of one arrangement, computed when asked for and kept.
 
     slack: inner shapes are eroded by this length [m] more, so that they stay obstacles wherever fingers move by less.
+    window: a box of relative positions; what leaves it counts as unbounded (default: far beyond all obstacles).
     on_grid: overlays on a grid of GRID, robust and slower, instead of in plain doubles.
     """
 
-    def __init__(self, arrangement: Arrangement, slack: float = 0.0, *, on_grid: bool = False) -> None:
-        self._arguments = arrangement, slack
+    def __init__(
+        self,
+        arrangement: Arrangement,
+        slack: float = 0.0,
+        *,
+        window: shapely.Polygon | None = None,
+        on_grid: bool = False,
+    ) -> None:
+        self._arguments = arrangement, slack, window
         self._grid = GRID if on_grid else None
         self.frame = Frame.of(arrangement.shape, arrangement.pose)
         self.fingers = self.frame.relative(arrangement.fingers)
         self.walls = self.frame.relative(arrangement.walls)
         self._vertices = arrangement.shape.vertices
         self._erosion = INNER_MARGIN + slack / self.frame.radius
-        obstacles = np.concatenate([self.fingers, self.walls.reshape(-1, 2), np.zeros((1, 2))])
-        self.box = shapely.box(*(obstacles.min(axis=0) - 2.5), *(obstacles.max(axis=0) + 2.5))
+        self.box = window or self._far_box()
         self._inner: dict[Cell, Components] = {}
         self._outer: dict[Cell, Components] = {}
         self._within: dict[Cell, list[int]] = {}
@@ -98,7 +105,12 @@ class CellComplex:
 
     def on_grid(self) -> "CellComplex":
         """The same cells, not yet computed, on a grid."""
-        return CellComplex(*self._arguments, on_grid=True)
+        arrangement, slack, window = self._arguments
+        return CellComplex(arrangement, slack, window=window, on_grid=True)
+
+    def _far_box(self) -> shapely.Polygon:
+        obstacles = np.concatenate([self.fingers, self.walls.reshape(-1, 2), np.zeros((1, 2))])
+        return shapely.box(*(obstacles.min(axis=0) - 2.5), *(obstacles.max(axis=0) + 2.5))
 
     @property
     def evaluated(self) -> int:
@@ -172,10 +184,9 @@ class CellComplex:
 
 
 def _outside(box: shapely.Polygon, obstacles: list[shapely.Geometry], grid: float | None) -> shapely.Geometry:
-    """Box minus obstacles; where doubles defeat the overlay outright, on the grid."""
+    """Box minus obstacles, one by one (overlays clip to the box); where doubles defeat that outright, on the grid."""
     try:
-        union = shapely.union_all(obstacles, grid_size=grid)
-        return shapely.difference(box, union, grid_size=grid)
+        return reduce(partial(shapely.difference, grid_size=grid), obstacles, box)
     except shapely.GEOSException:
         if grid is not None:
             raise

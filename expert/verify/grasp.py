@@ -42,10 +42,10 @@ from expert.verify.reach_tube import COARSEST, Tube, reach_tube, settled_slab
 from expert.verify.slab import uniform_ring
 from expert.verify.start_set import StartSet
 
-SPREAD = np.radians(10)
-"""What can be reached may leave the first half-range by this before it counts as leaking."""
-ROUNDS = 3
-"""What can be reached is computed with cells so often a quarter as wide, while that may yet exclude a dead end."""
+SPREADS = np.radians([2.0, 4.0, 10.0])
+"""What can be reached may leave a knot's half-range by this before it counts as leaking.  Where that leaves something
+open, it is computed again with the next spread and cells a quarter as wide.
+"""
 
 
 def verify(task: GraspProblem, answer: GraspSolution | None = None) -> GraspReport:
@@ -172,10 +172,10 @@ class _Check:
             self.doubts.append(str(error))
             return
         deadline = time.process_time() + time_limit
-        limit = float(self.problem.half_ranges[0] + SPREAD)
         tube = Tube(leak=(0.0, 0.0))
-        for coarsest in (COARSEST >> (2 * k) for k in range(ROUNDS)):
-            finer = reach_tube(self.path, limit, coarsest, deadline)
+        for k, spread in enumerate(SPREADS):
+            limits = self.problem.half_ranges[:-1] + spread
+            finer = reach_tube(self.path, limits, COARSEST >> (2 * k), deadline)
             if tube.closed and not finer.closed:
                 break  # no time: the coarse answer stands
             tube = finer
@@ -220,8 +220,11 @@ class _Check:
     def _alone(self, tube: Tube) -> bool:
         """Whether the contacts exclude everything but the goal among what can be reached at the end."""
         end, before = self.path.last, tube.slabs[-1]
-        last = settled_slab(self.path, end, end, uniform_ring(1), before.reached, np.pi)
-        return last is not None and self.isolation.holds_in(last.shift, *last.range)
+        for ring in (before.ring, uniform_ring(1)):
+            last = settled_slab(self.path, end, end, ring, before.reached, self.isolation.angle)
+            if last is not None and self.isolation.holds_in(last.shift, *last.range):
+                return True
+        return False
 
     def _dead_end(self, event: DeadEndEvent) -> DeadEnd:
         places = event.inner_configurations(9)

@@ -20,6 +20,8 @@ COARSEST = 64
 """Width of the widest cells that are of use, in units of the cage verifier: 4 degrees."""
 LEAST_SLACK = 1e-5
 """Slabs in which fingers move by less than twice this relative length (at first ten times as far) are not halved."""
+ROOM = 0.1
+"""What is reached in a slab may go beyond what its sources cover by this relative length."""
 NEAR_GOAL: Reached = {Cell(0, 1): [shapely.Point(0, 0)], Cell(TURN - 1, 1): [shapely.Point(0, 0)]}
 
 
@@ -44,16 +46,16 @@ class Tube:
         )
 
 
-def reach_tube(path: FingerPath, limit: float, coarsest: int, deadline: float) -> Tube:
-    """Flood from the goal's component at s = 0 to the end; orientations beyond the limit [rad] count as escaped.
+def reach_tube(path: FingerPath, limits: Array, coarsest: int, deadline: float) -> Tube:
+    """Flood from the goal's component at s = 0 to the end; orientations beyond a limit [rad] count as escaped.
 
-    coarsest: width of the widest cells, in units of the cage verifier; below COARSEST fingers move by no more in a slab.
-    deadline: processor time at which to give up.
+    limits: for each segment between knots.  coarsest: width of the widest cells, in units of the cage verifier; below
+    COARSEST fingers move by no more in a slab.  deadline: processor time at which to give up.
     """
     tube = Tube()
     first_round = coarsest == COARSEST
     longest, shortest = (np.inf, 10 * LEAST_SLACK) if first_round else (2 * coarsest * UNIT, LEAST_SLACK)
-    first = settled_slab(path, 0.0, 0.0, uniform_ring(coarsest), NEAR_GOAL, limit)
+    first = first_slab(path, coarsest, limits[0])
     if first is None:
         tube.leak = 0.0, 0.0
         return tube
@@ -63,7 +65,7 @@ def reach_tube(path: FingerPath, limit: float, coarsest: int, deadline: float) -
         knot = float(int(s) + 1)
         stride = min(stride, longest / max(_motion(path, knot - 1, knot), LEAST_SLACK))
         high = s + stride if stride < 0.999 * (knot - s) else knot
-        slab = settled_slab(path, s, high, ring, sources, limit)
+        slab = settled_slab(path, s, high, ring, sources, limits[int(s)])
         if slab is None:
             stride = 0.5 * (high - s)
         if time.process_time() > deadline or (slab is None and _motion(path, s, high) < 2 * shortest):
@@ -75,20 +77,41 @@ def reach_tube(path: FingerPath, limit: float, coarsest: int, deadline: float) -
     return tube
 
 
+def first_slab(path: FingerPath, coarsest: int, limit: float) -> Slab | None:
+    """What is reached at s = 0 from the goal, in cells that are fine only where they must be.
+
+    The way of a leak that begins at the goal says little about where cells are too wide, so all of them are halved.  One
+    that begins at what is known to be enough says more: coarse cells are tried once more from there.
+    """
+    ring = uniform_ring(coarsest)
+    fine = settled_slab(path, 0.0, 0.0, ring, NEAR_GOAL, limit, confirmed=False)
+    if fine is None:
+        return None
+    sparse = settled_slab(path, 0.0, 0.0, ring, fine.reached, limit, confirmed=False)
+    return settled_slab(path, 0.0, 0.0, (sparse or fine).ring, NEAR_GOAL, limit)
+
+
 def settled_slab(
-    path: FingerPath, low: float, high: float, ring: list[Cell], sources: Reached, limit: float
+    path: FingerPath,
+    low: float,
+    high: float,
+    ring: list[Cell],
+    sources: Reached,
+    limit: float,
+    *,
+    confirmed: bool = True,
 ) -> Slab | None:
     """What is reached in [low, high] from sources at low; None where it is not held with cells as fine as the motion.
 
     Overlays in plain doubles find the cells that are needed, and overlays on a grid confirm what they find.
     """
-    flood = SlabFlood(path, low, high, ring, on_grid=False)
-    finest = max(1, min(cell.width for cell in ring) // 2) if flood.slack else 1
+    flood = SlabFlood(path, low, high, ring, _around(sources))
+    finest = 1
     while finest * UNIT <= flood.slack and finest < COARSEST:
         finest *= 2
     while True:
         way = flood.flood(sources, limit)
-        if way is None and flood.on_grid:
+        if way is None and (flood.on_grid or not confirmed):
             return flood.slab()
         if way is None:
             flood.repeat_on_grid()
@@ -97,6 +120,14 @@ def settled_slab(
         if widest <= finest or flood.leaks_anyway(way[0][0]):
             return None
         flood.split({cell for cell, _ in way if cell.width == widest})
+
+
+def _around(sources: Reached) -> shapely.Polygon | None:
+    """A box that holds with room what is reached soon after the sources; none for the mere goal."""
+    if sources is NEAR_GOAL:
+        return None
+    corners = shapely.get_coordinates([p for polygons in sources.values() for p in polygons])
+    return shapely.box(*(corners.min(axis=0) - ROOM), *(corners.max(axis=0) + ROOM))
 
 
 def _motion(path: FingerPath, low: float, high: float) -> float:

@@ -5,9 +5,10 @@ by that much are obstacles throughout.  The components of what is left contain e
 a motion passes from cell to cell at a configuration that both contain.
 """
 
-from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import count
 
 import numpy as np
 import shapely
@@ -25,6 +26,12 @@ def signed_bounds(cell: Cell) -> tuple[float, float]:
     """First and last orientation [rad] of a cell, within half a turn of the goal."""
     start = cell.start - TURN if cell.start >= TURN // 2 else cell.start
     return start * UNIT, (start + cell.width) * UNIT
+
+
+def reach(cell: Cell) -> float:
+    """Largest deviation from the goal's orientation [rad]."""
+    low, high = signed_bounds(cell)
+    return max(-low, high)
 
 
 def uniform_ring(width: int) -> list[Cell]:
@@ -89,14 +96,19 @@ def wrapped(angle: float) -> float:
 
 
 class SlabFlood:
-    """Components of one slab, in cells of a ring, and a flood through them."""
+    """Components of one slab, in cells of a ring, and a flood through them.
 
-    def __init__(self, path: FingerPath, low: float, high: float, ring: list[Cell], *, on_grid: bool) -> None:
+    window: what is reached beyond this box of relative positions counts as unbounded; a small one saves time.
+    """
+
+    def __init__(
+        self, path: FingerPath, low: float, high: float, ring: list[Cell], window: shapely.Polygon | None
+    ) -> None:
         motion = float(np.linalg.norm(path.fingers(high) - path.fingers(low), axis=1).max())
-        self.low, self.high, self.on_grid = low, high, on_grid
+        self.low, self.high, self.on_grid = low, high, False
         self.slack = 0.5 * motion
         middle = path.arrangement(0.5 * (low + high))
-        self.space = CellComplex(middle, self.slack * path.frame.radius, on_grid=on_grid)
+        self.space = CellComplex(middle, self.slack * path.frame.radius, window=window)
         self.ring = ring
         self.came_from: dict[Node, Node | None] = {}
 
@@ -108,35 +120,33 @@ class SlabFlood:
         """Fill from what is known to be entered; a way to where the object is not held, if there is one.
 
         sources: cells of any ring, with geometries.  limit [rad]: orientations beyond it count as not held.
+        The outermost orientations come first: mostly they show early that the object is not held.
         """
         order = {cell: k for k, cell in enumerate(self.ring)}
-        queue: deque[Node] = deque()
+        waiting = _Waiting()
         self.came_from = {}
         for cell, shapes in self._matched(sources):
-            self._enter(cell, np.array(shapes), None, queue)
-        while queue:
-            node = queue.popleft()
-            cell, k = node
-            low, high = signed_bounds(cell)
-            parts = self.space.inner(cell)
-            if parts.unbounded[k] or max(-low, high) > limit:
-                return self._way(node)
+            waiting.push(cell, np.array(shapes), None)
+        while waiting.entries:
+            cell, entries, origin = waiting.pop()
             beside = (self.ring[order[cell] - 1], self.ring[(order[cell] + 1) % len(self.ring)])
-            for other in beside:
-                self._enter(other, parts.polygons[k : k + 1], node, queue)
+            for node in self._entered(cell, entries):
+                self.came_from[node] = origin
+                parts, k = self.space.inner(cell), node[1]
+                if parts.unbounded[k] or reach(cell) > limit:
+                    return self._way(node)
+                for other in beside:
+                    waiting.push(other, parts.polygons[k : k + 1], node)
         return None
 
-    def _enter(self, cell: Cell, shapes: np.ndarray, origin: Node | None, queue: deque[Node]) -> None:
-        """Queue the components of a cell that touch any of the geometries."""
+    def _entered(self, cell: Cell, entries: np.ndarray) -> list[Node]:
+        """New components of a cell that touch any of the geometries."""
         polygons = self.space.inner(cell).polygons
         fresh = [k for k in range(len(polygons)) if (cell, k) not in self.came_from]
         if not fresh:
-            return
-        met = shapely.intersects(polygons[fresh][:, None], shapes[None]).any(axis=1)
-        for k in np.flatnonzero(met):
-            node = (cell, fresh[k])
-            self.came_from[node] = origin
-            queue.append(node)
+            return []
+        met = shapely.intersects(polygons[fresh][:, None], entries[None]).any(axis=1)
+        return [(cell, fresh[k]) for k in np.flatnonzero(met)]
 
     def _matched(self, sources: Reached) -> Iterable[tuple[Cell, list[shapely.Geometry]]]:
         """Sources, by the cells of this ring whose orientations overlap theirs."""
@@ -178,3 +188,17 @@ class SlabFlood:
         for cell, k in self.came_from:
             reached.setdefault(cell, []).append(self.space.inner(cell).polygons[k])
         return Slab(self.low, self.high, self.ring, reached)
+
+
+class _Waiting:
+    """Cells to be entered through geometries, the outermost orientation first."""
+
+    def __init__(self) -> None:
+        self.entries: list[tuple[float, int, Cell, np.ndarray, Node | None]] = []
+        self._number = count()
+
+    def push(self, cell: Cell, geometries: np.ndarray, origin: Node | None) -> None:
+        heappush(self.entries, (-reach(cell), next(self._number), cell, geometries, origin))
+
+    def pop(self) -> tuple[Cell, np.ndarray, Node | None]:
+        return heappop(self.entries)[2:]
