@@ -13,6 +13,7 @@ from datasets.motions import FAMILIES, NoRoom, sample_task
 from datasets.render import Camera, Frames, render
 from datasets.shapes import ShapeFamily, Shapes
 from datasets.shapes_omnipush import OmniPush
+from datasets.specification import generator
 from dlm.perception import Perceived, PerceptionSettings, perceive
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import mass_properties, signed_area, simple_polygon
@@ -51,6 +52,15 @@ def errors(seen: Perceived, vertices: Array, poses: Array) -> tuple[float, float
 def perceived_task(seen: Perceived, task: ContactTask) -> ContactTask:
     body, _ = Body.uniform(seen.vertices, task.body.mass)
     return replace(task, body=body, trajectory=Trajectory.of(seen.poses, task.trajectory.dt, "rest"))
+
+
+def test_turns_run_on_from_step_to_step_where_the_fit_ends_a_whole_turn_away() -> None:
+    """Here the last two frames' alignment, with something in front of the object, ends one turn too far."""
+    family = list(FAMILIES)[15 % len(FAMILIES)]
+    task = sample_task(generator("perception12", 0, 15, 0), family, Shapes(facets=(12, 12)))
+    seen = perceive(DISTURBANCES["occlusion"](video_of(task), np.random.default_rng([15, 17])))
+    assert seen.status == "ok"
+    np.testing.assert_allclose(seen.poses, task.trajectory.poses, atol=np.radians(0.5))
 
 
 @pytest.mark.parametrize("family", FAMILIES)

@@ -7,9 +7,10 @@ import torch
 from matplotlib.figure import Figure
 
 from dlm.checkpoint import load
-from dlm.losses import ActionLoss, Loss, ParameterLoss
+from dlm.losses import ActionLoss, Loss, ParameterLoss, SimulationLoss
 from dlm.models import Kind
 from dlm.simulator import SimulatorSettings
+from dlm.structured.bias import STATED
 from dlm.structured.examples import Example
 from dlm.structured.losses import CalibrationLoss, CheckedClassLoss, ClassLoss, class_distance
 from dlm.structured.policies import StructuredArchitecture
@@ -49,13 +50,30 @@ def train(
     return training.history
 
 
-@pytest.mark.parametrize("loss", [ClassLoss(), CheckedClassLoss()], ids=["mdr", "cvx"])
-def test_a_stopped_training_reaches_the_same_losses(tasks: TaskBatch, tmp_path: Path, loss: Loss) -> None:
-    whole = train(tasks, tmp_path / "whole.safetensors", loss)
-    train(tasks, tmp_path / "cut.safetensors", loss, iterations=3)
-    assert train(tasks, tmp_path / "cut.safetensors", loss, resume=True) == whole
+SMOOTH = SimulatorSettings(kappa=1250.0)
+STAGES: dict[str, tuple[Kind, Loss]] = {
+    "nn": ("regressor", ActionLoss()),
+    "nnm": ("regressor", SimulationLoss(simulator=SMOOTH)),
+    "mdr": ("best_guess", ClassLoss()),
+    "cvx": ("proposals", CheckedClassLoss()),
+    "dlm": ("proposals", CalibrationLoss(simulator=SMOOTH, bias=STATED)),
+}
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_a_stopped_training_reaches_the_same_losses(tasks: TaskBatch, tmp_path: Path, stage: str) -> None:
+    kind, loss = STAGES[stage]
+    length = 6
+    if stage == "dlm":  # whose every step looks at fifteen calibrations
+        length, tasks = 2, tasks[torch.arange(2)]
+    whole = train(tasks, tmp_path / "whole.safetensors", loss, kind=kind, iterations=length)
+    train(tasks, tmp_path / "cut.safetensors", loss, kind=kind, iterations=length // 2)
+    assert (
+        train(tasks, tmp_path / "cut.safetensors", loss, kind=kind, iterations=length, resume=True) == whole
+    )
     ends = [load(tmp_path / f"{name}.safetensors", command="").model for name in ("whole", "cut")]
     assert all(torch.equal(ends[0][key], ends[1][key]) for key in ends[0])
+    assert len({row["loss"] for row in whole}) == length  # it did learn something
 
 
 def test_the_scorer_learns_four_tasks_by_heart(tasks: TaskBatch, tmp_path: Path) -> None:
