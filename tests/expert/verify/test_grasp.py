@@ -30,9 +30,12 @@ JAMMING = {
     95: np.radians([51.5, 48, 11, 6.5, 3.2]),
     112: WIDE,
     321: WIDE,
+    399: np.radians([31, 28, 24, 18, 5]),
+    414: np.radians([22, 18.5, 14, 8.5, 4.2]),
+    436: np.radians([31, 28.5, 20, 6, 3]),
 }
-"""Seeds and half-ranges of paths whose cages are nested, as the thesis asks, and that jam all the same: polygons of four, five and
-seven sides, and the I twice."""
+"""Seeds and half-ranges of paths whose cages are nested, as the thesis asks, and that jam all the same: random polygons of four, five
+and (twice) seven sides, twice the I, the hourglass and the M."""
 CERTIFIED = (11, 52)
 
 
