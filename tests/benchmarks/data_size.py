@@ -26,7 +26,7 @@ from dlm.tasks import TaskBatch
 from evaluate import load_policy
 
 ROOT = Path(__file__).resolve().parents[2]
-BATCH, STEPS = 20, 2000
+BATCH, STEPS = 20, 1000
 STAGES = {"thesis": ("nn", "mdr", "cvx"), "structured": ("mdr",)}
 """Stages that learn from labels.  CVX starts from MDR, takes half as many steps, and smaller ones."""
 SETS = {"test": "data/test-seed0", "family": "data/family-seed0"}

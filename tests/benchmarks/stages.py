@@ -43,17 +43,21 @@ Act = Callable[[Sample, Frames], Action]
 KINDS = {"nn": "regressor", "nnm": "regressor", "mdr": "best_guess"}
 CHECKED = "MDR, 8 checked"
 """The scorer of MDR with the planner of CVX."""
+GUESSED = "CVX, one class"
+"""The scorer of CVX with the planner of MDR."""
 PAIRS = (
     ("NN", "NNM"),
     ("NNM", "MDR"),
+    ("MDR", GUESSED),
     ("MDR", CHECKED),
+    ("MDR", "CVX"),
     (CHECKED, "CVX"),
-    (CHECKED, "DLM"),
-    (CHECKED, "no learning"),
+    ("CVX", "DLM"),
+    ("CVX", "no learning"),
     ("no learning", "expert"),
 )
 SETS = ("4-6", "12", "biased")
-BIASED_PAIRS = ((CHECKED, "DLM"), (CHECKED, "DLM for this camera"))
+BIASED_PAIRS = (("CVX", "DLM"), ("CVX", "DLM for this camera"))
 
 
 def policy(folder: Path, stage: str, see: Perceiver, kind: str = "") -> Policy | None:
@@ -133,12 +137,13 @@ def main() -> int:
     see = Perceiver()
     folder = options.output / f"seed_{options.seed}"
     trained = {s: policy(folder, s, see) for s in ("nn", "nnm", "mdr", "cvx", "dlm", "dlm_biased")}
-    if (one := policy(folder, "mdr", see, "proposals")) is not None:
-        trained[CHECKED] = one
+    for title, stage, kind in ((CHECKED, "mdr", "proposals"), (GUESSED, "cvx", "best_guess")):
+        if (one := policy(folder, stage, see, kind)) is not None:
+            trained[title] = one
     plain = StructuredModel(perceive=see)
     rows: dict[str, Act] = {"no action": lambda s, v: idle_action(TaskBatch.of([s]))}
     rows |= {
-        s if s == CHECKED else s.upper(): of_policy(p)
+        s if s in (CHECKED, GUESSED) else s.upper(): of_policy(p)
         for s, p in trained.items()
         if p is not None and s != "dlm_biased"
     }
@@ -147,7 +152,7 @@ def main() -> int:
         "expert": of_model(StructuredModel(planner=ExpertPlanner(), perceive=see)),
         "oracle": lambda s, v: expert_action(TaskBatch.of([s])),
     }
-    biased = {n: rows[n] for n in ("no action", CHECKED, "DLM") if n in rows}
+    biased = {n: rows[n] for n in ("no action", "CVX", "DLM") if n in rows}
     if (one := trained["dlm_biased"]) is not None:
         biased["DLM for this camera"] = of_policy(one)
     results: dict[str, dict[str, list[Record]]] = {}
@@ -173,6 +178,7 @@ def main() -> int:
                 "median": float(np.median(loss)),
                 "within": within,
                 "dropped": dropped,
+                "losses": loss.tolist(),
             }
         Console(width=110).print(table)
         pairs = [p for p in (BIASED_PAIRS if "biased" in title else PAIRS) if set(p) <= set(found)]
