@@ -20,7 +20,7 @@ from expert.verify.grasp_report import GraspReport
 Method = Literal["goal_cell", "decomposed", "miqp1", "miqp2"]
 MOST_CELLS, MOST_CHECKS = 8, 20
 """Goal cells, and proposals of any other kind, that the checker sees."""
-QUICK_CHECK, PATIENT_CHECK = 3.0, 8.0
+QUICK_CHECK, PATIENT_CHECK = 1.5, 8.0
 """Processor time [s] that the checker may spend on what one proposal can reach, at first and for those still in doubt."""
 
 

@@ -13,7 +13,7 @@ start      Q0, from inside
 """
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -42,8 +42,10 @@ from expert.verify.reach_tube import COARSEST, Tube, reach_tube, settled_slab
 from expert.verify.slab import uniform_ring
 from expert.verify.start_set import StartSet
 
-TIGHT, WIDE = np.radians([2, 4]), np.radians(10)
-"""What can be reached may leave a knot's half-range by this, or later the first one's, before it counts as leaking."""
+TIGHT, WIDE = np.radians([2, 10])
+"""What can be reached may leave a knot's half-range by the one, or else the first one's by the other, before it leaks."""
+ROUNDS = 3
+"""What can be reached is computed with cells so often a quarter as wide, while that may yet exclude a dead end."""
 
 
 def verify(task: GraspProblem, answer: GraspSolution | None = None) -> GraspReport:
@@ -95,7 +97,7 @@ class _Check:
 
     def run(self, full: bool, time_limit: float) -> GraspReport:
         """All parts; unless `full`, only up to the first that fails."""
-        jams = partial(self.check_dead_ends, full, time_limit)
+        jams = partial(self.check_dead_ends, time_limit)
         steps: dict[str, Callable[[], None]] = {
             "path": self.check_path,
             "end": self.check_end,
@@ -162,7 +164,7 @@ class _Check:
         """Q0."""
         self.start = StartSet(self.path)
 
-    def check_dead_ends(self, full: bool, time_limit: float) -> None:
+    def check_dead_ends(self, time_limit: float) -> None:
         """What can be reached from Q0 stays bounded, meets no dead end, and is the goal alone in the end."""
         try:
             events = dead_end_events(self.path)
@@ -171,30 +173,31 @@ class _Check:
             return
         deadline = time.process_time() + time_limit
         tube = Tube(leak=(0.0, 0.0))
-        for limits, coarsest in self._rounds():
-            finer = reach_tube(self.path, limits, coarsest, deadline)
+        for coarsest in (COARSEST >> (2 * k) for k in range(ROUNDS)):
+            finer = self._tube(coarsest, deadline)
             if tube.closed and not finer.closed:
                 break  # no time: the coarse answer stands
             tube = finer
             jams = [self._dead_end(e) for e in events if tube.meets(e.s, e.first, e.last)]
             alone = tube.closed and self._alone(tube)
-            sure = any(jam.witness is not None for jam in jams) and (tube.closed or not full)
+            sure = any(jam.witness is not None for jam in jams)
             if sure or (alone and not jams) or time.process_time() > deadline:
                 break
         self._record(tube, jams, len(events), alone)
         self._conclude(tube, jams, alone)
 
-    def _rounds(self) -> Iterator[tuple[Array, int]]:
-        """Limits [rad] for each segment, and widths of cells, in which what can be reached is computed in turn.
+    def _tube(self, coarsest: int, deadline: float) -> Tube:
+        """What can be reached, with cells of at most this width.
 
-        A nested cage mostly stays within its half-range all the way, and cells need not be fine to show it.  What jams
-        does not stay there; then the first half-range bounds everything.
+        Mostly it stays within the half-ranges all the way, which is the easier to show the tighter they are.  What jams
+        does not; then the first one bounds everything.
         """
         half_ranges = self.problem.half_ranges[:-1]
-        for k, spread in enumerate(TIGHT):
-            yield half_ranges + spread, COARSEST >> (2 * k)
-        for k in range(3):
-            yield np.full(len(half_ranges), half_ranges[0] + WIDE), COARSEST >> (2 * k)
+        tube = reach_tube(self.path, half_ranges + TIGHT, coarsest, deadline)
+        if not tube.closed:
+            limits = np.full(len(half_ranges), half_ranges[0] + WIDE)
+            tube = reach_tube(self.path, limits, coarsest, deadline)
+        return tube
 
     def _record(self, tube: Tube, jams: list[DeadEnd], listed: int, alone: bool) -> None:
         unknown = np.full((len(self.path.knots), 2), np.nan)

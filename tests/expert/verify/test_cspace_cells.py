@@ -81,6 +81,30 @@ def test_components_enclose_and_are_enclosed_by_the_free_space(width: int) -> No
     assert min(counts) > 50
 
 
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10**6), st.booleans())
+def test_a_window_shows_the_same_free_space_and_what_leaves_it_is_unbounded(seed: int, on_grid: bool) -> None:
+    rng = np.random.default_rng(seed)
+    shape, around = Shape(vertices=named_shape("T")), rng.uniform(0, 2 * np.pi, 6)
+    frame, distances = Frame.of(shape, np.zeros(3)), rng.uniform(1.01, 1.4, 6)
+    fingers = frame.centre + frame.radius * distances[:, None] * np.column_stack(
+        [np.cos(around), np.sin(around)]
+    )
+    arrangement = Arrangement(shape=shape, pose=np.zeros(3), fingers=fingers)
+    corner = rng.uniform(-1, 0, 2)
+    window, cell = (
+        shapely.box(*corner, *(corner + rng.uniform(0.2, 2, 2))),
+        Cell(16 * int(rng.integers(360)), 16),
+    )
+    whole = CellComplex(arrangement, on_grid=on_grid).inner(cell)
+    seen = CellComplex(arrangement, window=window, on_grid=on_grid).inner(cell)
+    expected = shapely.intersection(shapely.union_all(whole.polygons), window)
+    assert shapely.symmetric_difference(shapely.union_all(seen.polygons), expected).area < 1e-7
+    for part, unbounded in zip(seen.polygons, seen.unbounded, strict=True):
+        origin = whole.polygons[shapely.area(shapely.intersection(whole.polygons, part)).argmax()]
+        assert unbounded == (shapely.difference(origin, window).area > 1e-7)
+
+
 def is_free(arrangement: Arrangement, pose: Array) -> bool:
     polygon = shapely.Polygon(arrangement.shape.vertices)
     points = shapely.points(to_body(pose, arrangement.fingers))
