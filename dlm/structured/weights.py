@@ -1,6 +1,6 @@
 """Shipped weights: a checkpoint without what only training needs.
 
-`python -m dlm.structured.weights runs/large/seed_0/mdr.safetensors` makes the file of the package from a trained stage.
+`python -m dlm.structured.weights runs/large/seed_0/cvx.safetensors` makes the file of the package from a trained stage.
 """
 
 import sys

@@ -31,7 +31,7 @@ from datasets.shapes_omnipush import OmniPush
 from datasets.specification import Sample, Specification
 from datasets.store import read_dataset
 from dlm.evaluation.outcomes import FALLEN
-from dlm.execution import expert_action, idle_action, idle_where_unsolved, simulate
+from dlm.execution import expert_action, given_action, idle_action, idle_where_unsolved, simulate
 from dlm.inverse_dynamics import Action
 from dlm.metrics import object_trajectory_loss, rotation_error, translation_error, within
 from dlm.simulator import SimulatorSettings
@@ -39,8 +39,9 @@ from dlm.structured import ExpertPlanner, Planned, StructuredModel
 from dlm.structured.policies import unsolved
 from dlm.tasks import TaskBatch
 from expert.errors import InvalidProblem
+from expert.geometry.pose import to_body, to_world
 from expert.mechanics import external_contacts
-from expert.types import ContactTask
+from expert.types import FREE, ContactTask, Plan
 
 KINDS: dict[str, ShapeFamily] = {
     "4-6": Shapes(),
@@ -164,7 +165,23 @@ def cause(planned: Planned | None, sample: Sample) -> str:
     oracle = executed(expert_action(TaskBatch.of([sample])), sample)
     if not oracle["within"]:
         return "the expert's own plan fails in execution"
+    moved, distance = meeting(planned.plan, true)
+    if executed(moved, sample)["within"]:
+        return f"a finger meets the outline {distance:.2f} mm too early or too late, which its spring makes much of"
     return f"execution, with geometry right ({turn:.2f} deg, outline {deviation:.2f} mm)"
+
+
+def meeting(plan: Plan, task: ContactTask) -> tuple[Action, float]:
+    """The plan with its touching fingers moved onto the true outline, and how far at most [mm]."""
+    outline = shapely.Polygon(task.body.vertices).exterior
+    planned = to_body(task.trajectory.poses, plan.positions)
+    along = shapely.line_locate_point(outline, shapely.points(planned))
+    nearest = shapely.get_coordinates(shapely.line_interpolate_point(outline, along)).reshape(planned.shape)
+    body = np.where(plan.modes[..., None] == FREE, planned, nearest)
+    positions = torch.from_numpy(to_world(task.trajectory.poses, body))[None]
+    return given_action(positions, torch.from_numpy(np.array(plan.forces))[None]), 1e3 * float(
+        np.linalg.norm(body - planned, axis=-1).max()
+    )
 
 
 def contacts_of(task: ContactTask) -> list[tuple]:
