@@ -176,19 +176,25 @@ def test_the_report_fits_desks_and_telephones(results: Path, tmp_path: Path, wid
 
 
 @pytest.mark.slow
-def test_the_same_seeds_give_the_same_weights_side_by_side_and_after_a_kill(workplace: Path) -> None:
-    """Two seeds one after the other, undisturbed; and in two processes, killed at a random moment and gone on with."""
-    seeds = (3, 4)
+@pytest.mark.parametrize(
+    ("model", "stage", "seeds"), [("thesis", "mdr", (3, 4)), ("structured", "structured/mdr", (3,))]
+)
+def test_the_same_seeds_give_the_same_weights_side_by_side_and_after_a_kill(
+    workplace: Path, model: str, stage: str, seeds: tuple[int, ...]
+) -> None:
+    """One seed after the other, undisturbed; and a process for each, killed at a random moment and gone on with."""
+    side_by_side = f"jobs={len(seeds)}"
     schedule = ["schedule.iterations=30", "schedule.log_every=10", "schedule.save_every=1"]
-    command = ["stage=mdr", "experiment=smoke", f"seeds=[{','.join(map(str, seeds))}]", *schedule]
-    whole = start("train.py", *command, "output=whole", cwd=workplace)
-    killed = start("train.py", *command, "output=killed", "jobs=2", cwd=workplace)
-    kill_after_first_checkpoint(killed, workplace / "killed", moment=random.random())
+    command = [f"model={model}", f"stage={stage}", "experiment=smoke", f"seeds=[{','.join(map(str, seeds))}]"]
+    command += schedule
+    whole = start("train.py", *command, f"output=whole/{model}", cwd=workplace)
+    killed = start("train.py", *command, f"output=killed/{model}", side_by_side, cwd=workplace)
+    kill_after_first_checkpoint(killed, workplace / "killed" / model, moment=random.random())
     finish(whole)
-    finish(start("train.py", *command, "output=killed", "jobs=2", "resume=true", cwd=workplace))
+    finish(start("train.py", *command, f"output=killed/{model}", side_by_side, "resume=true", cwd=workplace))
     for seed in seeds:
         a, b = (
-            load(workplace / name / f"seed_{seed}" / "mdr.safetensors", command="")
+            load(workplace / name / model / f"seed_{seed}" / "mdr.safetensors", command="")
             for name in ("whole", "killed")
         )
         assert len(a.about.history) == 4  # after iterations 1, 10, 20, 30
