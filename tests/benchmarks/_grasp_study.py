@@ -4,7 +4,7 @@ import argparse
 import json
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from expert.files.certified_grasp import schedule
 from expert.geometry.pose import Array, to_world
 from expert.grasping.problem import GraspProblem, GraspSolution, Shape
 from expert.grasping.shapes import NAMES, grasp_shape, irregular_polygon
+from expert.grasping.sweeping import sweep
 from expert.grasping.synthesis import solve
 from expert.verify.grasp import verify_grasp
 from expert.verify.grasp_report import GraspReport
@@ -78,6 +79,22 @@ def moved_report(problem: GraspProblem, answer: GraspSolution) -> GraspReport:
     origin = to_world(motion, problem.pose[None, :2])[0]
     moved = replace(problem, pose=np.append(origin, problem.pose[2] + motion[2]))
     return verify_grasp(moved, to_world(motion, answer.path), answer.facets)
+
+
+@dataclass(frozen=True)
+class Arrivals:
+    """Executions (M,): which end at the goal, and how far the worst is off, over the object's size and in degrees."""
+
+    arrived: np.ndarray
+    worst_distance: float
+    worst_angle: float
+
+
+def arrivals(problem: GraspProblem, path: Array, starts: Array) -> Arrivals:
+    """Of the sweeping process from starts (M, 3)."""
+    distance, angle = sweep(problem.shape, path, starts, goal=problem.pose).misses(problem.pose)
+    distance, angle = distance / problem.shape.size, np.degrees(angle)
+    return Arrivals((distance <= DISTANCE) & (angle <= ANGLE), float(distance.max()), float(angle.max()))
 
 
 def watched(items: Iterable[Any], what: str, total: int | None = None) -> Iterable[Any]:

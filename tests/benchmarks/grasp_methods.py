@@ -5,7 +5,8 @@
 Parts and bars (seconds are processor time of one thread):
 methods        starts: MIQP2 >= MIQP1 and goal cell >= MIQP2 in the median
 sensitivity    to finger placement and finger friction, contact simulator and MuJoCo: reported, no bar
-three_fingers  certified at 15 deg, held to second order: reported, no bar but that no certificate is refuted after a motion
+three_fingers  certified at 15 deg, held to second order: no certificate is refuted after a motion, all starts of
+               certified ones arrive; how many there are is reported
 force_closure  ends from the same starts by contacts chosen for their quality: reported, no bar
 """
 
@@ -24,7 +25,18 @@ from expert.grasping.sweeping import sweep
 from expert.grasping.synthesis import solve
 from expert.verify.finger_path import FingerPath
 from expert.verify.start_set import StartSet
-from tests.benchmarks._grasp_study import TIME_LIMIT, Bars, Part, Row, Study, moved_report, run, task, watched
+from tests.benchmarks._grasp_study import (
+    TIME_LIMIT,
+    Bars,
+    Part,
+    Row,
+    Study,
+    arrivals,
+    moved_report,
+    run,
+    task,
+    watched,
+)
 
 PLACEMENT, FRICTION = (0.0005, 0.001, 0.002, 0.005), (0.0, 0.05, 0.1)
 SAME = 1e-4
@@ -122,11 +134,20 @@ def three_fingers(study: Study) -> tuple[list[Row], Bars]:
         if len(answer.path):
             row["area"] = start_area(problem, answer) / mass_properties(vertices).area
             row["verdict"] = moved_report(problem, answer).verdict
+            row |= _arrivals(problem, answer, 100 if study.quick else 500)
         rows.append(row | {"reason": answer.reason})
     sure = [row for row in rows if row["status"] == "certified"]
     return rows, {
-        "no certificate is refuted after a motion": all(row["verdict"] != "refuted" for row in sure)
+        "no certificate is refuted after a motion": all(row["verdict"] != "refuted" for row in sure),
+        "every certified start arrives": bool(sure) and all(row["arrived"] == 1 for row in sure),
     }
+
+
+def _arrivals(problem: GraspProblem, answer: GraspSolution, count: int) -> Row:
+    starts = StartSet(FingerPath(problem.shape, problem.pose, answer.path))
+    runs = arrivals(problem, answer.path, starts.starts(np.random.default_rng(0), count))
+    worst = {"worst_distance": runs.worst_distance, "worst_angle_deg": runs.worst_angle}
+    return {"arrived": float(runs.arrived.mean()), **worst}
 
 
 PARTS: dict[str, Part] = {

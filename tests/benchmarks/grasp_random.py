@@ -28,7 +28,7 @@ from expert.verify.finger_path import FingerPath
 from expert.verify.grasp import verify_grasp
 from expert.verify.grasp_report import GraspReport
 from expert.verify.start_set import StartSet
-from tests.benchmarks._grasp_study import ANGLE, DISTANCE, Bars, Part, Row, Study, run, watched
+from tests.benchmarks._grasp_study import Bars, Part, Row, Study, arrivals, run, watched
 from tests.expert.grasping.experiments import closing_path, miss
 from tests.expert.verify.grasps import shrinking_case
 
@@ -103,8 +103,7 @@ def _nested() -> Iterator[tuple[GraspProblem, Array, GraspReport]]:
 def _judge(problem: GraspProblem, path: Array, report: GraspReport, row: Row) -> None:
     """Add one path to the tally of `nested_cages`."""
     starts = StartSet(FingerPath(problem.shape, problem.pose, path)).starts(np.random.default_rng(0), 200)
-    distance, angle = sweep(problem.shape, path, starts, goal=problem.pose).misses(problem.pose)
-    share = float(((distance > DISTANCE * problem.shape.size) | (np.degrees(angle) > ANGLE)).mean())
+    share = float(1 - arrivals(problem, path, starts).arrived.mean())
     row[report.verdict] += 1
     row[f"{report.verdict}_that_jam"] += share > 0
     row["worst_share_of_starts"] = max(row["worst_share_of_starts"], share)

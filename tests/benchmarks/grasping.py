@@ -15,10 +15,9 @@ import time
 import numpy as np
 
 from expert.geometry.polygon import mass_properties
-from expert.grasping.sweeping import sweep
 from expert.verify.finger_path import FingerPath
 from expert.verify.start_set import StartSet
-from tests.benchmarks._grasp_study import ANGLE, DISTANCE, Bars, Part, Row, Study, moved_report, run, watched
+from tests.benchmarks._grasp_study import Bars, Part, Row, Study, arrivals, moved_report, run, watched
 from tests.expert.grasping.experiments import hard_starts
 
 MEDIAN_BAR, MAX_BAR, DEAD_END_BAR, WIDE_BAR = 5.0, 30.0, 2.0, 10 / 12
@@ -81,15 +80,12 @@ def executions(study: Study) -> tuple[list[Row], Bars]:
         starts, rng = StartSet(path), np.random.default_rng(0)
         random, hard = starts.starts(rng, count), hard_starts(path, starts, rng)
         began = time.process_time()
-        run = sweep(problem.shape, answer.path, np.concatenate([random, hard]), goal=problem.pose)
+        runs = arrivals(problem, answer.path, np.concatenate([random, hard]))
         seconds = time.process_time() - began
-        distance, angle = run.misses(problem.pose)
-        arrived = (distance <= DISTANCE * problem.shape.size) & (np.degrees(angle) <= ANGLE)
         rows.append({
-            "object": name, "degrees": degrees, "random": f"{arrived[:count].sum()}/{count}",
-            "hard": f"{arrived[count:].sum()}/{len(hard)}", "arrived": bool(arrived.all()),
-            "worst_distance": float(distance.max() / problem.shape.size),
-            "worst_angle_deg": float(np.degrees(angle.max())), "seconds": seconds,
+            "object": name, "degrees": degrees, "random": f"{runs.arrived[:count].sum()}/{count}",
+            "hard": f"{runs.arrived[count:].sum()}/{len(hard)}", "arrived": bool(runs.arrived.all()),
+            "worst_distance": runs.worst_distance, "worst_angle_deg": runs.worst_angle, "seconds": seconds,
         })  # fmt: skip
     return rows, {"every certified start arrives": bool(rows) and all(r["arrived"] for r in rows)}
 
