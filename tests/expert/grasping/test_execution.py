@@ -5,6 +5,7 @@ import pytest
 
 from dlm.simulator.grasp import replay_grasp, replay_grasp_in_mujoco
 from expert.caging.problem import Shape
+from expert.files import read_problem
 from expert.grasping.problem import GraspProblem, GraspSolution
 from expert.grasping.shapes import grasp_shape, irregular_polygon
 from expert.grasping.sweeping import sweep
@@ -76,6 +77,23 @@ def test_mujoco_arrives_too(certified: Certified) -> None:
     end = replay_grasp_in_mujoco(problem, answer.path, start)[-1] - problem.pose
     assert np.linalg.norm(end[:2]) <= 2e-3 * problem.shape.size
     assert abs(end[2]) <= np.radians(0.3)
+
+
+def test_three_fingers_that_hold_to_second_order_bring_every_start_to_the_goal() -> None:
+    problem = read_problem("configs/problem/certified_grasp/arrow_3.yaml").task
+    answer = solve(problem)
+    assert answer.found
+    report = verify_grasp(problem, answer.path, answer.facets)
+    assert report.end
+    assert report.end.form_closure == 2
+    assert report.start
+    run = sweep(problem.shape, answer.path, report.start.starts(np.random.default_rng(6), 100))
+    distance, angle = run.misses(problem.pose)
+    assert not (
+        run.stalled < len(answer.path) - 1 - 1e-6
+    ).any()  # the object's rate has no bound at the very end
+    assert distance.max() <= TOLERANCE * problem.shape.size
+    assert angle.max() <= ANGLE
 
 
 @pytest.mark.parametrize("name", ["I, late", "quadrangle", "I, early", "MIQP2's answer"])
