@@ -40,7 +40,10 @@ class Candidate:
 
 
 def cells(table: Facets, count: int, margin: float) -> list[GoalCell]:
-    """Facets and rays that may hold the object at the goal: moments of both senses are within reach of the contacts."""
+    """Facets and rays that may hold the object at the goal: moments of both senses are within reach of the contacts.
+
+    Where two fingers share a facet, changing places exchanges the rays: one order of these is enough.
+    """
     found = []
     for chosen in tuples(table, count):
         reachable = _moments(table, chosen, margin)
@@ -49,7 +52,7 @@ def cells(table: Facets, count: int, margin: float) -> list[GoalCell]:
             if cell.E[0] > 0 and reachable[0, 0] < 0 < reachable[0, 1]:
                 found.append(cell)
             continue
-        for up, down in ((0, 1), (1, 0)):
+        for up, down in ((0, 1), (1, 0)) if len(set(chosen)) == count else ((0, 1),):
             if reachable[up, 0] < -LEAST_MOMENT and reachable[down, 1] > LEAST_MOMENT:
                 found.append(GoalCell(table, chosen, up, down, margin))
     return found

@@ -38,8 +38,9 @@ from expert.verify.end_grasp import (
 from expert.verify.event_kernel import TOUCH
 from expert.verify.finger_path import FingerPath
 from expert.verify.grasp_report import Cages, DeadEnd, DeadEnds, EndGrasp, GraspReport, Verdict
+from expert.verify.pockets import Pockets
 from expert.verify.reach_tube import COARSEST, Tube, reach_tube, settled_slab
-from expert.verify.slab import uniform_ring
+from expert.verify.slab import uniform_ring, wrapped
 from expert.verify.start_set import StartSet
 
 TIGHT, WIDE = np.radians([2, 10])
@@ -172,9 +173,9 @@ class _Check:
             self.doubts.append(str(error))
             return
         deadline = time.process_time() + time_limit
-        tube = Tube(leak=(0.0, 0.0))
+        tube, pockets = Tube(leak=(0.0, 0.0)), self._pockets(events)
         for coarsest in (COARSEST >> (2 * k) for k in range(ROUNDS)):
-            finer = self._tube(coarsest, deadline)
+            finer = self._tube(coarsest, deadline, pockets)
             if tube.closed and not finer.closed:
                 break  # no time: the coarse answer stands
             tube = finer
@@ -186,15 +187,22 @@ class _Check:
         self._record(tube, jams, len(events), alone)
         self._conclude(tube, jams, alone)
 
-    def _tube(self, coarsest: int, deadline: float) -> Tube:
+    def _pockets(self, events: list[DeadEndEvent]) -> Pockets:
+        """Of those dead ends that are at orientations which are reached."""
+        widest = self.problem.half_ranges[0] + TIGHT
+        return Pockets.before(
+            self.path, [event for event in events if abs(wrapped(event.first[2])) <= widest]
+        )
+
+    def _tube(self, coarsest: int, deadline: float, pockets: Pockets) -> Tube:
         """What can be reached, with cells of at most this width.
 
-        Mostly it stays within the half-ranges all the way, which is the easier to show the tighter they are.  What jams
-        does not; then the first one bounds everything.
+        Mostly it stays within the half-ranges all the way, and out of the pockets of dead ends, which is the easier to show
+        the tighter the ranges are.  What jams does neither; then the first range bounds everything.
         """
         half_ranges = self.problem.half_ranges[:-1]
-        tube = reach_tube(self.path, half_ranges + TIGHT, coarsest, deadline)
-        if not tube.closed:
+        tube = reach_tube(self.path, half_ranges + TIGHT, coarsest, deadline, pockets)
+        if not tube.closed and time.process_time() <= deadline:
             limits = np.full(len(half_ranges), half_ranges[0] + WIDE)
             tube = reach_tube(self.path, limits, coarsest, deadline)
         return tube

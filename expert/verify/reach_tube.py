@@ -14,6 +14,7 @@ from expert.geometry.pose import Array
 from expert.verify.cage_search import UNIT
 from expert.verify.cspace_cells import TURN, Cell
 from expert.verify.finger_path import FingerPath
+from expert.verify.pockets import NONE, Pockets
 from expert.verify.slab import Reached, Slab, SlabFlood, coarsened, uniform_ring
 
 COARSEST = 64
@@ -46,16 +47,18 @@ class Tube:
         )
 
 
-def reach_tube(path: FingerPath, limits: Array, coarsest: int, deadline: float) -> Tube:
+def reach_tube(
+    path: FingerPath, limits: Array, coarsest: int, deadline: float, pockets: Pockets = NONE
+) -> Tube:
     """Flood from the goal's component at s = 0 to the end; orientations beyond a limit [rad] count as escaped.
 
     limits: for each segment between knots.  coarsest: width of the widest cells, in units of the cage verifier; below
-    COARSEST fingers move by no more in a slab.  deadline: processor time at which to give up.
+    COARSEST fingers move by no more in a slab.  pockets: who reaches them counts as escaped.  deadline: processor time at which to give up.
     """
     tube = Tube()
     first_round = coarsest == COARSEST
     longest, shortest = (np.inf, 10 * LEAST_SLACK) if first_round else (2 * coarsest * UNIT, LEAST_SLACK)
-    first = first_slab(path, coarsest, limits[0])
+    first = first_slab(path, coarsest, limits[0], pockets.at(0.0, 0.0))
     if first is None:
         tube.leak = 0.0, 0.0
         return tube
@@ -65,7 +68,7 @@ def reach_tube(path: FingerPath, limits: Array, coarsest: int, deadline: float) 
         knot = float(int(s) + 1)
         stride = min(stride, longest / max(_motion(path, knot - 1, knot), LEAST_SLACK))
         high = s + stride if stride < 0.999 * (knot - s) else knot
-        slab = settled_slab(path, s, high, ring, sources, limits[int(s)])
+        slab = settled_slab(path, s, high, ring, sources, limits[int(s)], pockets.at(s, high))
         if slab is None:
             stride = 0.5 * (high - s)
         if time.process_time() > deadline or (slab is None and _motion(path, s, high) < 2 * shortest):
@@ -77,18 +80,18 @@ def reach_tube(path: FingerPath, limits: Array, coarsest: int, deadline: float) 
     return tube
 
 
-def first_slab(path: FingerPath, coarsest: int, limit: float) -> Slab | None:
+def first_slab(path: FingerPath, coarsest: int, limit: float, avoid: Array) -> Slab | None:
     """What is reached at s = 0 from the goal, in cells that are fine only where they must be.
 
     The way of a leak that begins at the goal says little about where cells are too wide, so all of them are halved.  One
     that begins at what is known to be enough says more: coarse cells are tried once more from there.
     """
     ring = uniform_ring(coarsest)
-    fine = settled_slab(path, 0.0, 0.0, ring, NEAR_GOAL, limit, confirmed=False)
+    fine = settled_slab(path, 0.0, 0.0, ring, NEAR_GOAL, limit, avoid, confirmed=False)
     if fine is None:
         return None
-    sparse = settled_slab(path, 0.0, 0.0, ring, fine.reached, limit, confirmed=False)
-    return settled_slab(path, 0.0, 0.0, (sparse or fine).ring, NEAR_GOAL, limit)
+    sparse = settled_slab(path, 0.0, 0.0, ring, fine.reached, limit, avoid, confirmed=False)
+    return settled_slab(path, 0.0, 0.0, (sparse or fine).ring, NEAR_GOAL, limit, avoid)
 
 
 def settled_slab(
@@ -98,6 +101,7 @@ def settled_slab(
     ring: list[Cell],
     sources: Reached,
     limit: float,
+    avoid: Array = NONE.configurations,
     *,
     confirmed: bool = True,
 ) -> Slab | None:
@@ -110,7 +114,7 @@ def settled_slab(
     while finest * UNIT <= flood.slack and finest < COARSEST:
         finest *= 2
     while True:
-        way = flood.flood(sources, limit)
+        way = flood.flood(sources, limit, avoid)
         if way is None and (flood.on_grid or not confirmed):
             return flood.slab()
         if way is None:

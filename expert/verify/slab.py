@@ -90,9 +90,9 @@ def segment(first: Array, last: Array) -> shapely.Geometry:
     return shapely.Point(first[:2]) if same else shapely.LineString([first[:2], last[:2]])
 
 
-def wrapped(angle: float) -> float:
-    """The orientation within half a turn of the goal."""
-    return float((angle + np.pi) % (2 * np.pi) - np.pi)
+def wrapped(angle: Array) -> Array:
+    """Orientations within half a turn of the goal."""
+    return (np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi
 
 
 class SlabFlood:
@@ -116,11 +116,11 @@ class SlabFlood:
         """Use overlays on a grid, robust and slower, from now on."""
         self.space, self.on_grid = self.space.on_grid(), True
 
-    def flood(self, sources: Reached, limit: float) -> list[Node] | None:
+    def flood(self, sources: Reached, limit: float, avoid: Array) -> list[Node] | None:
         """Fill from what is known to be entered; a way to where the object is not held, if there is one.
 
         sources: cells of any ring, with geometries.  limit [rad]: orientations beyond it count as not held.
-        The outermost orientations come first: mostly they show early that the object is not held.
+        avoid: so do components with one of these configurations (M, 3).  The outermost orientations come first: mostly they show early that the object is not held.
         """
         order = {cell: k for k, cell in enumerate(self.ring)}
         waiting = _Waiting()
@@ -133,7 +133,7 @@ class SlabFlood:
             for node in self._entered(cell, entries):
                 self.came_from[node] = origin
                 parts, k = self.space.inner(cell), node[1]
-                if parts.unbounded[k] or reach(cell) > limit:
+                if parts.unbounded[k] or reach(cell) > limit or _holds_any(cell, parts.polygons[k], avoid):
                     return self._way(node)
                 for other in beside:
                     waiting.push(other, parts.polygons[k : k + 1], node)
@@ -188,6 +188,14 @@ class SlabFlood:
         for cell, k in self.came_from:
             reached.setdefault(cell, []).append(self.space.inner(cell).polygons[k])
         return Slab(self.low, self.high, self.ring, reached)
+
+
+def _holds_any(cell: Cell, polygon: shapely.Polygon, configurations: Array) -> bool:
+    """Whether any of the configurations (M, 3) is in a component of a cell."""
+    low, high = signed_bounds(cell)
+    x, y, angle = configurations[:, 0], configurations[:, 1], wrapped(configurations[:, 2])
+    inside = (low <= angle) & (angle <= high)
+    return bool(inside.any() and shapely.intersects_xy(polygon, x[inside], y[inside]).any())
 
 
 class _Waiting:
