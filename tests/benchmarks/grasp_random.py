@@ -7,11 +7,13 @@ dead_ends      every stall on 300 uncertified random paths is a predicted dead e
                one, untouched, stalls there
 nested_cages   40 random paths that meet the thesis's conditions: none that is certified jams; some jam all the same, and
                so does every witness start by which the checker refutes one
+unchecked      answers of MIQP2 for half-ranges of 45 deg, which no checker has filtered: the same
 observability  sensor rank 3 exactly where first-order form closure holds, 1,000 random grasps
 """
 
 import itertools
 import sys
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -19,6 +21,7 @@ from scipy.optimize import linprog
 
 from expert.geometry.pose import Array
 from expert.grasping.problem import GraspProblem, Shape
+from expert.grasping.proposals import Search, thesis
 from expert.grasping.shapes import irregular_polygon
 from expert.grasping.sweeping import sweep
 from expert.verify.dead_ends import DeadEndEvent, dead_end_events
@@ -28,7 +31,7 @@ from expert.verify.finger_path import FingerPath
 from expert.verify.grasp import verify_grasp
 from expert.verify.grasp_report import GraspReport
 from expert.verify.start_set import StartSet
-from tests.benchmarks._grasp_study import Bars, Part, Row, Study, arrivals, run, watched
+from tests.benchmarks._grasp_study import TIME_LIMIT, Bars, Part, Row, Study, arrivals, run, task, watched
 from tests.expert.grasping.experiments import closing_path, miss
 from tests.expert.verify.grasps import shrinking_case
 
@@ -74,16 +77,36 @@ def _stalls(path: FingerPath, event: DeadEndEvent) -> bool:
 
 def nested_cages(study: Study) -> tuple[list[Row], Bars]:
     """Random paths that meet the thesis's conditions: what the checker says, and what executions do."""
-    wanted = 4 if study.quick else 40
-    row: Row = {"paths": wanted, "certified": 0, "refuted": 0, "unknown": 0, "certified_that_jam": 0,
-                "refuted_that_jam": 0, "unknown_that_jam": 0, "witnesses": 0, "witnesses_that_jam": 0,
-                "worst_share_of_starts": 0.0}  # fmt: skip
+    wanted, row = 4 if study.quick else 40, _tally()
     for problem, path, report in watched(itertools.islice(_nested(), wanted), "nested cages", wanted):
         _judge(problem, path, report, row)
-    return [row], {
-        "no certified path jams": row["certified_that_jam"] == 0,
-        "some nested cages jam": row["refuted_that_jam"] > 0,
-        "every witness jams": 0 < row["witnesses"] == row["witnesses_that_jam"],
+    return [row], _tally_bars([row])
+
+
+def unchecked(study: Study) -> tuple[list[Row], Bars]:
+    """Answers of the thesis's model, whose cages are nested as well: what the checker says, and what executions do."""
+    rows = []
+    for name in watched(["polygon 1"] if study.quick else list(study.random)[:4], "unchecked"):
+        problem, row = task(study.objects[name], 45.0), _tally()
+        search = Search(problem, time.perf_counter() + TIME_LIMIT)
+        for proposal in itertools.islice(thesis(search, "miqp2"), 1 if study.quick else 5):
+            path = search.frame.world(proposal.path)
+            _judge(problem, path, verify_grasp(problem, path, full=False, time_limit=CHECK), row)
+        rows.append({"object": name} | row)
+    return rows, _tally_bars(rows)
+
+
+def _tally() -> Row:
+    verdicts = ("certified", "refuted", "unknown")
+    row: Row = {"paths": 0} | dict.fromkeys(verdicts, 0) | {f"{verdict}_that_jam": 0 for verdict in verdicts}
+    return row | {"witnesses": 0, "witnesses_that_jam": 0, "worst_share_of_starts": 0.0}
+
+
+def _tally_bars(rows: list[Row]) -> Bars:
+    return {
+        "no certified path jams": all(row["certified_that_jam"] == 0 for row in rows),
+        "some nested cages jam": any(row["refuted_that_jam"] > 0 for row in rows),
+        "every witness jams": all(row["witnesses"] == row["witnesses_that_jam"] for row in rows),
     }
 
 
@@ -101,7 +124,8 @@ def _nested() -> Iterator[tuple[GraspProblem, Array, GraspReport]]:
 
 
 def _judge(problem: GraspProblem, path: Array, report: GraspReport, row: Row) -> None:
-    """Add one path to the tally of `nested_cages`."""
+    """Add one path to a tally."""
+    row["paths"] += 1
     starts = StartSet(FingerPath(problem.shape, problem.pose, path)).starts(np.random.default_rng(0), 200)
     share = float(1 - arrivals(problem, path, starts).arrived.mean())
     row[report.verdict] += 1
@@ -161,6 +185,7 @@ def balances(gradients: Array) -> bool:
 PARTS: dict[str, Part] = {
     "dead_ends": dead_ends,
     "nested_cages": nested_cages,
+    "unchecked": unchecked,
     "observability": observability,
 }
 
