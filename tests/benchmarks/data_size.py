@@ -1,9 +1,10 @@
 """What more tasks are worth: the thesis's networks and the structured model, trained on the first 20, 200, ... tasks of one set.
 
-    python -m tests.benchmarks.data_size [--quick] [--sizes 20 200 2000 10000] [--models thesis structured] [--json FILE]
+    python -m tests.benchmarks.data_size [--quick] [--sizes 20 200 2000 10000] [--models thesis structured] [--batch-norm settled]
 
 Every size takes equally many steps of Adam, in batches of 20 tasks: only the data differ.  Losses are those of Table 4.1, on its test
 set (12 facets) and its family set, in the simulator with rigid contact.  Training is left to train.py; stopped, it goes on.
+Settled: the statistics of batch norm are taken anew after training, over (up to 2,000 of) the tasks that were trained on.
 """
 
 import argparse
@@ -17,7 +18,9 @@ import torch
 from rich.console import Console
 from rich.table import Table
 
+from dlm.checkpoint import read_about
 from dlm.evaluation.outcomes import Outcome, act, execute
+from dlm.evaluation.settle import settle
 from dlm.execution import idle_action
 from dlm.models import Policy
 from dlm.simulator import SimulatorSettings
@@ -29,6 +32,8 @@ ROOT = Path(__file__).resolve().parents[2]
 BATCH, STEPS = 20, 1000
 STAGES = {"thesis": ("nn", "mdr", "cvx"), "structured": ("mdr",)}
 """Stages that learn from labels.  CVX starts from MDR, takes half as many steps, and smaller ones."""
+SETTLING = 2000
+"""Most tasks that statistics are taken over."""
 SETS = {"test": "data/test-seed0", "family": "data/family-seed0"}
 QUICK = {"test": "data/smoke-seed0"}
 TITLES = {("structured", "mdr"): "structured, one class", ("structured", "8"): "structured, 8 checked"}
@@ -36,11 +41,23 @@ TITLES = {("structured", "mdr"): "structured, one class", ("structured", "8"): "
 Row = dict[str, object]
 
 
+def iterations_of(stage: str, size: int, options: argparse.Namespace) -> int:
+    """Passes over so many tasks."""
+    steps = options.steps // 2 if stage == "cvx" else options.steps
+    return max(1, steps * min(BATCH, size) // size)
+
+
+def train(model: str, stage: str, size: int, options: argparse.Namespace) -> None:
+    """One stage, unless that is done."""
+    path = folder(model, size, options) / "seed_0" / f"{stage}.safetensors"
+    if not path.exists() or read_about(path, command="").iteration < iterations_of(stage, size, options):
+        subprocess.run([sys.executable, *command(model, stage, size, options)], check=True, cwd=ROOT)
+
+
 def command(model: str, stage: str, size: int, options: argparse.Namespace) -> list[str]:
     """What trains one stage on the first `size` tasks."""
     batch = min(BATCH, size)
-    steps = options.steps // 2 if stage == "cvx" else options.steps
-    iterations = max(1, steps * batch // size)
+    iterations = iterations_of(stage, size, options)
     schedule = {"batch_size": batch, "learning_rate": 1e-3, "log_every": iterations}
     schedule |= {"iterations": iterations, "save_every": -(-iterations // 4)}
     own = {"iterations": iterations, "learning_rate": 3e-4}
@@ -66,8 +83,13 @@ def folder(model: str, size: int, options: argparse.Namespace) -> Path:
 def policies(model: str, size: int, options: argparse.Namespace) -> dict[str, Policy]:
     """The trained stages by their titles in the table; the structured scorer also with eight of its proposals checked."""
     found: dict[str, Policy] = {}
+    seen = None
+    if model == "thesis" and options.batch_norm == "settled":
+        seen = TaskBatch.read(options.train, min(size, SETTLING))
     for stage in STAGES[model]:
         policy = load_policy(folder(model, size, options), stage, 0)[1]
+        if seen is not None:
+            settle(policy, seen)
         found[TITLES.get((model, stage), stage.upper())] = policy
         if isinstance(policy, ProposalPolicy):
             many = ProposalPolicy(policy.scorer, policy.base, (8,), widen=False)
@@ -129,6 +151,8 @@ def main() -> int:
     parser.add_argument("--models", nargs="+", choices=list(STAGES), default=list(STAGES))
     parser.add_argument("--steps", type=int, default=STEPS)
     parser.add_argument("--data", default="large", help="configuration of the data sets")
+    parser.add_argument("--train", default="data/large-seed0", help="their training set")
+    parser.add_argument("--batch-norm", choices=["running", "settled"], default="running")
     parser.add_argument("--output", type=Path, default=Path("runs/data_size"))
     parser.add_argument("--json", type=Path)
     parser.add_argument(
@@ -136,13 +160,13 @@ def main() -> int:
     )
     options = parser.parse_args()
     if options.quick:
-        options.sizes, options.steps, options.data = [2, 4], 4, "smoke"
+        options.sizes, options.steps, options.data, options.train = [2, 4], 4, "smoke", QUICK["test"]
         options.output = options.output / "quick"
     torch.set_num_threads(1)
     for model in options.models:
         for size in options.sizes:
             for stage in STAGES[model]:
-                subprocess.run([sys.executable, *command(model, stage, size, options)], check=True, cwd=ROOT)
+                train(model, stage, size, options)
     rows = measured(options)
     table = Table(*rows[0])
     for row in rows:
