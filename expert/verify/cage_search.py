@@ -53,7 +53,7 @@ class CageSearch:
             route = self.candidate_escape()
             if route is None:
                 blunt = self.blunt_ends(range_resolution)
-                blunt |= self.leading_beyond(within) if within and not blunt else set()
+                blunt |= self.leading_beyond(within) if within is not None and not blunt else set()
                 if not blunt:
                     return "caged", nowhere
                 self.split(blunt)
