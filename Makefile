@@ -24,8 +24,9 @@ demo: setup
 	$(BIN)/python train.py stage=all experiment=$(EXPERIMENT) $(TRAIN)
 	$(BIN)/python evaluate.py experiment=$(EXPERIMENT)
 
+# With the tables and curves that `tests.benchmarks.ablations` and `data_size` left in build/extras (--extras), if any.
 report: setup
-	$(BIN)/python evaluate.py experiment=$(EXPERIMENT)
+	$(BIN)/python evaluate.py experiment=$(EXPERIMENT) $(if $(wildcard build/extras/*.json),extras=[build/extras])
 
 test: setup
 	$(BIN)/python -m pytest -n 2 --dist loadfile
