@@ -97,7 +97,7 @@ class CellComplex:
         self.walls = self.frame.relative(arrangement.walls)
         self._vertices = arrangement.shape.vertices
         self._erosion = INNER_MARGIN + slack / self.frame.radius
-        self.box = window or self._far_box()
+        self.box, self._windowed = window or self._far_box(), window is not None
         self._inner: dict[Cell, Components] = {}
         self._outer: dict[Cell, Components] = {}
         self._within: dict[Cell, list[int]] = {}
@@ -157,7 +157,7 @@ class CellComplex:
 
     def _free(self, cell: Cell, shape: SweptShape) -> Components:
         obstacles = self._obstacles(shape, sum(cell.bounds) / 2)
-        polygons = shapely.get_parts(np.array([_outside(self.box, obstacles, self._grid)]))
+        polygons = shapely.get_parts(np.array([_outside(self.box, obstacles, self._grid, self._windowed)]))
         rim = np.abs(shapely.bounds(polygons) - shapely.bounds(self.box)) <= 1e-9
         return Components(polygons, rim.any(axis=1).tolist())
 
@@ -183,14 +183,20 @@ class CellComplex:
         return obstacles
 
 
-def _outside(box: shapely.Polygon, obstacles: list[shapely.Geometry], grid: float | None) -> shapely.Geometry:
-    """Box minus obstacles, one by one (overlays clip to the box); where doubles defeat that outright, on the grid."""
+def _outside(
+    box: shapely.Polygon, obstacles: list[shapely.Geometry], grid: float | None, one_by_one: bool
+) -> shapely.Geometry:
+    """Box minus obstacles; where doubles defeat the overlay outright, on the grid.
+
+    one_by_one: overlays clip to the box, so cutting off each obstacle in turn pays where the box is small.
+    """
     try:
-        return reduce(partial(shapely.difference, grid_size=grid), obstacles, box)
+        cut = obstacles if one_by_one else [shapely.union_all(obstacles, grid_size=grid)]
+        return reduce(partial(shapely.difference, grid_size=grid), cut, box)
     except shapely.GEOSException:
         if grid is not None:
             raise
-        return _outside(box, obstacles, GRID)
+        return _outside(box, obstacles, GRID, one_by_one)
 
 
 def _common(a: Geometries, b: Geometries) -> Geometries:
