@@ -51,7 +51,10 @@ class TaskBatch:
 
     @classmethod
     def read(cls, folder: str | Path, count: int | None = None) -> "TaskBatch":
-        """A data set, or its first `count` tasks.  Raises InvalidProblem where it is missing, unfinished, empty, damaged, or smaller."""
+        """A data set, or its first `count` tasks.
+
+        Raises InvalidProblem where it is missing, unfinished, empty, damaged, or smaller.
+        """
         data = read_dataset(folder)
         if count is not None:
             fits = isinstance(count, int) and 2 <= count <= len(data)

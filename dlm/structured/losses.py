@@ -107,8 +107,8 @@ class CalibrationLoss:
     """4-CT10 as a function of the calibration, differentiated by central differences of `step` units through everything.
 
     A knob has a slope only where one of its sides is better by `worth` [cm^2]: L_sim is flat and steep in turns, and the
-    mere middle of a flat stretch is no reason to leave a calibration.  prior: price of a knob's square.  bias: the videos are seen anew by
-    such a camera.
+    mere middle of a flat stretch is no reason to leave a calibration.  prior: price of a knob's square.  bias: the videos are seen
+    anew by such a camera.
     """
 
     simulator: SimulatorSettings

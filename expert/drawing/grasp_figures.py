@@ -35,8 +35,6 @@ from expert.verify.start_set import StartSet
 
 RANDOM, NAMED, METHODS = 12, ("T", "hourglass", "M", "I"), ("miqp1", "miqp2", "goal_cell")
 RUNS, COMPARED = 60, 100
-DISTANCE, ANGLE = 1e-5, np.radians(0.01)
-"""An end this near to the goal, over the object's diameter and in rad, is there."""
 TIME_LIMIT = 300.0
 """Of the clock, for one object [s]."""
 REACH = 0.2
@@ -79,7 +77,7 @@ def random_polygons() -> tuple[Figure, dict[str, Any]]:
         draw_starts(axes, task, answer, runs)
         _square(axes)
         off, turned = runs.misses(task.pose)
-        arrived = int(((off <= DISTANCE * task.shape.size) & (turned <= ANGLE)).sum())
+        arrived = int(runs.arrived(task.pose, task.shape.size).sum())
         rows[-1] |= {
             "runs": RUNS, "arrived": arrived,
             "worst_distance": float(off.max() / task.shape.size), "worst_angle_deg": _deg(turned.max()),

@@ -12,6 +12,11 @@ def rotation(theta: ArrayLike) -> Array:
     return np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)
 
 
+def wrapped(angle: ArrayLike) -> Array:
+    """The same orientations [rad] within half a turn of zero."""
+    return (np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi
+
+
 def to_world(pose: ArrayLike, points_b: ArrayLike) -> Array:
     """Body points (..., n, 2) [m] at poses (..., 3), in the world frame."""
     pose = np.asarray(pose, dtype=float)

@@ -24,6 +24,8 @@ STEP = 3e-4
 """Largest finger motion of a step, over the object's diameter."""
 SAMPLES = 40
 """Recorded poses per knot interval."""
+NEAR, TURNED = 1e-5, np.radians(0.01)
+"""An end this near to the goal, over the object's diameter and in rad, is there."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +49,11 @@ class Sweep:
         """Distance [m] of the body frame's origin and angle [rad] from a goal pose (3,) at the end, each (M,)."""
         off = self.ends - goal
         return np.linalg.norm(off[:, :2], axis=1), np.abs(off[:, 2])
+
+    def arrived(self, goal: Array, size: float) -> np.ndarray:
+        """Which executions (M,) of an object of this diameter [m] end at a goal pose (3,)."""
+        distance, angle = self.misses(goal)
+        return (distance <= NEAR * size) & (angle <= TURNED)
 
 
 def sweep(

@@ -90,14 +90,14 @@ class CellComplex:
         window: shapely.Polygon | None = None,
         on_grid: bool = False,
     ) -> None:
-        self._arguments = arrangement, slack, window
+        self._arrangement, self._slack, self._window = arrangement, slack, window
         self._grid = GRID if on_grid else None
         self.frame = Frame.of(arrangement.shape, arrangement.pose)
         self.fingers = self.frame.relative(arrangement.fingers)
         self.walls = self.frame.relative(arrangement.walls)
         self._vertices = arrangement.shape.vertices
         self._erosion = INNER_MARGIN + slack / self.frame.radius
-        self.box, self._windowed = window or self._far_box(), window is not None
+        self.box = window or self._far_box()
         self._inner: dict[Cell, Components] = {}
         self._outer: dict[Cell, Components] = {}
         self._within: dict[Cell, list[int]] = {}
@@ -105,8 +105,7 @@ class CellComplex:
 
     def on_grid(self) -> "CellComplex":
         """The same cells, not yet computed, on a grid."""
-        arrangement, slack, window = self._arguments
-        return CellComplex(arrangement, slack, window=window, on_grid=True)
+        return CellComplex(self._arrangement, self._slack, window=self._window, on_grid=True)
 
     def _far_box(self) -> shapely.Polygon:
         obstacles = np.concatenate([self.fingers, self.walls.reshape(-1, 2), np.zeros((1, 2))])
@@ -157,7 +156,9 @@ class CellComplex:
 
     def _free(self, cell: Cell, shape: SweptShape) -> Components:
         obstacles = self._obstacles(shape, sum(cell.bounds) / 2)
-        polygons = shapely.get_parts(np.array([_outside(self.box, obstacles, self._grid, self._windowed)]))
+        free = _outside(self.box, obstacles, self._grid, one_by_one=self._window is not None)
+        polygons = shapely.get_parts(np.array([free]))
+        polygons = polygons[~shapely.is_empty(polygons)]  # a window may be covered
         rim = np.abs(shapely.bounds(polygons) - shapely.bounds(self.box)) <= 1e-9
         return Components(polygons, rim.any(axis=1).tolist())
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from expert.geometry.pose import Array
+from expert.geometry.pose import Array, wrapped
 
 
 @dataclass(frozen=True)
@@ -50,16 +50,12 @@ def _way_out(leg: Leg, here: Array, box: shapely.Polygon) -> Array:
 def _common_angle(a: tuple[float, float], b: tuple[float, float]) -> float:
     """The orientation that neighbouring cells share, up to full turns."""
     pairs = [(x, y) for x in a for y in b]
-    return min(pairs, key=lambda p: abs(_wrapped(p[0] - p[1])))[0]
+    return min(pairs, key=lambda p: abs(wrapped(p[0] - p[1])))[0]
 
 
 def _nearest(angle: float, reference: float) -> float:
     """The same orientation, full turns added, nearest to the reference."""
-    return reference + _wrapped(angle - reference)
-
-
-def _wrapped(angle: float) -> float:
-    return (angle + np.pi) % (2 * np.pi) - np.pi
+    return reference + float(wrapped(angle - reference))
 
 
 def _translation(component: shapely.Polygon, here: Array, there: Array) -> list[Array]:

@@ -13,7 +13,7 @@ import numpy as np
 from expert.caging.frame import Frame
 from expert.caging.problem import Arrangement, Shape
 from expert.geometry.polygon import facet_frames, reflex_vertices, signed_distance
-from expert.geometry.pose import Array, rotation
+from expert.geometry.pose import Array, rotation, wrapped
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class FingerPath:
         """Relative configurations (M, 3), within half a turn of the goal, of world poses (M, 3)."""
         poses = np.reshape(poses, (-1, 3))
         middle = poses[:, :2] + (rotation(poses[:, 2]) @ self.frame.centre)
-        turn = (poses[:, 2] - self.pose[2] + np.pi) % (2 * np.pi) - np.pi
+        turn = wrapped(poses[:, 2] - self.pose[2])
         return np.column_stack([self.frame.relative(middle), turn])
 
     def gap(self, configurations: Array, s: float) -> Array:

@@ -21,7 +21,7 @@ import numpy as np
 
 from expert.caging.problem import START_TOLERANCE
 from expert.errors import InvalidProblem, SolverFailed
-from expert.geometry.pose import Array
+from expert.geometry.pose import Array, wrapped
 from expert.grasping.problem import GraspProblem, GraspSolution
 from expert.types import readonly
 from expert.verify.cage import verify_cage
@@ -40,7 +40,7 @@ from expert.verify.finger_path import FingerPath
 from expert.verify.grasp_report import Cages, DeadEnd, DeadEnds, EndGrasp, GraspReport, Verdict
 from expert.verify.pockets import Pockets
 from expert.verify.reach_tube import COARSEST, Tube, reach_tube, settled_slab
-from expert.verify.slab import uniform_ring, wrapped
+from expert.verify.slab import uniform_ring
 from expert.verify.start_set import StartSet
 
 TIGHT, WIDE = np.radians([2, 10])

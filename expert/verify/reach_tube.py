@@ -53,7 +53,8 @@ def reach_tube(
     """Flood from the goal's component at s = 0 to the end; orientations beyond a limit [rad] count as escaped.
 
     limits: for each segment between knots.  coarsest: width of the widest cells, in units of the cage verifier; below
-    COARSEST fingers move by no more in a slab.  pockets: who reaches them counts as escaped.  deadline: processor time at which to give up.
+    COARSEST fingers move by no more in a slab.  deadline: processor time at which to give up.  pockets: what reaches them
+    counts as escaped.
     """
     tube = Tube()
     first_round = coarsest == COARSEST

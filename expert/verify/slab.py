@@ -13,7 +13,7 @@ from itertools import count
 import numpy as np
 import shapely
 
-from expert.geometry.pose import Array
+from expert.geometry.pose import Array, wrapped
 from expert.verify.cage_search import UNIT
 from expert.verify.cspace_cells import TURN, Cell, CellComplex
 from expert.verify.finger_path import FingerPath
@@ -90,11 +90,6 @@ def segment(first: Array, last: Array) -> shapely.Geometry:
     return shapely.Point(first[:2]) if same else shapely.LineString([first[:2], last[:2]])
 
 
-def wrapped(angle: Array) -> Array:
-    """Orientations within half a turn of the goal."""
-    return (np.asarray(angle) + np.pi) % (2 * np.pi) - np.pi
-
-
 class SlabFlood:
     """Components of one slab, in cells of a ring, and a flood through them.
 
@@ -120,7 +115,8 @@ class SlabFlood:
         """Fill from what is known to be entered; a way to where the object is not held, if there is one.
 
         sources: cells of any ring, with geometries.  limit [rad]: orientations beyond it count as not held.
-        avoid: so do components with one of these configurations (M, 3).  The outermost orientations come first: mostly they show early that the object is not held.
+        avoid: so do components with one of these configurations (M, 3).
+        The outermost orientations come first: mostly they show early that the object is not held.
         """
         order = {cell: k for k, cell in enumerate(self.ring)}
         waiting = _Waiting()

@@ -25,8 +25,6 @@ from expert.verify.grasp_report import GraspReport
 QUIET = Console(stderr=True)
 TIME_LIMIT = 300.0
 """Of the clock [s]: generous, so that other load does not count."""
-DISTANCE, ANGLE = 1e-5, 0.01
-"""An end this near to the goal, over the object's size and in degrees, is there."""
 Row = dict[str, Any]
 Bars = dict[str, bool]
 
@@ -92,9 +90,10 @@ class Arrivals:
 
 def arrivals(problem: GraspProblem, path: Array, starts: Array) -> Arrivals:
     """Of the sweeping process from starts (M, 3)."""
-    distance, angle = sweep(problem.shape, path, starts, goal=problem.pose).misses(problem.pose)
-    distance, angle = distance / problem.shape.size, np.degrees(angle)
-    return Arrivals((distance <= DISTANCE) & (angle <= ANGLE), float(distance.max()), float(angle.max()))
+    runs, size = sweep(problem.shape, path, starts, goal=problem.pose), problem.shape.size
+    distance, angle = runs.misses(problem.pose)
+    worst = float(distance.max() / size), float(np.degrees(angle.max()))
+    return Arrivals(runs.arrived(problem.pose, size), *worst)
 
 
 def watched(items: Iterable[Any], what: str, total: int | None = None) -> Iterable[Any]:

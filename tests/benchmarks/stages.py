@@ -25,27 +25,23 @@ from dlm.checkpoint import load, restore_weights
 from dlm.evaluation.significance import compare_all
 from dlm.execution import expert_action, idle_action
 from dlm.inverse_dynamics import Action
-from dlm.models import Policy
+from dlm.models import Kind, Policy
 from dlm.structured import ExpertPlanner, StructuredModel
 from dlm.structured.bias import STATED
-from dlm.structured.policies import (
-    Perceiver,
-    ProposalPolicy,
-    RegressorPolicy,
-    StructuredArchitecture,
-    unsolved,
-)
+from dlm.structured.policies import Perceiver, StructuredArchitecture, unsolved
 from dlm.tasks import TaskBatch
 from expert.errors import InvalidProblem
 from tests.benchmarks.structured import SEED, Record, executed, fresh
 
 Act = Callable[[Sample, Frames], Action]
-KINDS = {"nn": "regressor", "nnm": "regressor", "mdr": "best_guess"}
+KINDS: dict[str, Kind] = {"nn": "regressor", "nnm": "regressor", "mdr": "best_guess"}
 CHECKED = "MDR, 8 checked"
 """The scorer of MDR with the planner of CVX."""
 GUESSED = "CVX, one class"
 """The scorer of CVX with the planner of MDR."""
-PAIRS = (
+FITTED = "DLM for this camera"
+Pairs = tuple[tuple[str, str], ...]
+PAIRS: Pairs = (
     ("NN", "NNM"),
     ("NNM", "MDR"),
     ("MDR", GUESSED),
@@ -57,18 +53,18 @@ PAIRS = (
     ("no learning", "expert"),
 )
 SETS = ("4-6", "12", "biased")
-BIASED_PAIRS = (("CVX", "DLM"), ("CVX", "DLM for this camera"))
+BIASED_PAIRS: Pairs = (("CVX", "DLM"), ("CVX", FITTED))
 
 
-def policy(folder: Path, stage: str, see: Perceiver, kind: str = "") -> Policy | None:
+def policy(folder: Path, stage: str, see: Perceiver, kind: Kind) -> Policy | None:
     """A trained stage, None if there is no such checkpoint."""
     path = folder / f"{stage}.safetensors"
     if not path.is_file():
         print(f"no {path}: left out", file=sys.stderr)
         return None
-    built = StructuredArchitecture().build(kind or KINDS.get(stage, "proposals"))  # type: ignore[arg-type]
-    assert isinstance(built, ProposalPolicy | RegressorPolicy)
-    built.base = _seeing(built.base, see)
+    fresh_ones = StructuredArchitecture()
+    built = fresh_ones.regressor() if kind == "regressor" else fresh_ones.proposer(kind)
+    built.base = replace(built.base, perceive=see)
     restore_weights(
         built.weights(),
         load(path, command="python train.py experiment=large"),
@@ -76,10 +72,6 @@ def policy(folder: Path, stage: str, see: Perceiver, kind: str = "") -> Policy |
         source=path,
     )
     return built.eval()
-
-
-def _seeing(model: StructuredModel, see: Perceiver) -> StructuredModel:
-    return replace(model, perceive=see)
 
 
 def of_policy(one: Policy) -> Act:
@@ -122,6 +114,84 @@ def losses(records: list[Record]) -> np.ndarray:
     return np.array([r["loss"] for r in records], dtype=float)
 
 
+def learned(folder: Path, see: Perceiver) -> dict[str, Act]:
+    """Rows of the stages that are there, in order; the one for the biased camera comes last."""
+    plan: list[tuple[str, str, Kind]] = [
+        (stage.upper(), stage, KINDS.get(stage, "proposals")) for stage in ("nn", "nnm", "mdr", "cvx", "dlm")
+    ]
+    plan += [
+        (CHECKED, "mdr", "proposals"),
+        (GUESSED, "cvx", "best_guess"),
+        (FITTED, "dlm_biased", "proposals"),
+    ]
+    found = ((title, policy(folder, stage, see, kind)) for title, stage, kind in plan)
+    return {title: of_policy(one) for title, one in found if one is not None}
+
+
+def rows_of(folder: Path, see: Perceiver) -> tuple[dict[str, Act], dict[str, Act]]:
+    """What is compared where the camera is as stated, and where it is biased."""
+    rows: dict[str, Act] = {"no action": lambda s, v: idle_action(TaskBatch.of([s]))}
+    rows |= learned(folder, see)
+    biased = {name: rows[name] for name in ("no action", "CVX", "DLM", FITTED) if name in rows}
+    rows.pop(FITTED, None)
+    rows |= {
+        "no learning": of_model(StructuredModel(perceive=see)),
+        "expert": of_model(StructuredModel(planner=ExpertPlanner(), perceive=see)),
+        "oracle": lambda s, v: expert_action(TaskBatch.of([s])),
+    }
+    return rows, biased
+
+
+def measured(options: argparse.Namespace) -> dict[str, dict[str, list[Record]]]:
+    """Records by set and row."""
+    see, camera = Perceiver(), StructuredModel().camera
+    rows, biased = rows_of(options.output / f"seed_{options.seed}", see)
+    results: dict[str, dict[str, list[Record]]] = {}
+    for name in options.sets:
+        count = 20 if options.quick else options.tasks
+        samples = fresh("4-6" if name == "biased" else name, count, SEED + 2, options.folder)
+        if name == "biased":
+            videos = [STATED.video(s.task.body, s.task.trajectory.poses, camera) for s in samples]
+            results["4-6 facets, biased camera"] = run(biased, samples, videos, name)
+        else:
+            results[f"{name} facets"] = run(rows, samples, [s.video for s in samples], name)
+    return results
+
+
+def figures(records: list[Record], idle: float) -> dict[str, object]:
+    """What the table shows of one row; idle: mean loss of no action."""
+    loss = losses(records)
+    return {
+        "mean": float(loss.mean()),
+        "ratio": float(loss.mean() / idle),
+        "median": float(np.median(loss)),
+        "within": float(np.mean([bool(r["within"]) for r in records])),
+        "dropped": sum(bool(r["dropped"]) for r in records),
+        "losses": loss.tolist(),
+    }
+
+
+def shown(title: str, found: dict[str, list[Record]], pairs: Pairs) -> dict[str, object]:
+    """Print the table and the tests of one set; the same as plain values."""
+    table = Table("", "mean", "median", "within", "dropped", title=title)
+    idle = float(losses(found["no action"]).mean())
+    report: dict[str, object] = {}
+    for name, records in found.items():
+        row = report[name] = figures(records, idle)
+        cells = (f"{row['mean']:.4g}", f"{row['median']:.2g}", f"{row['within']:.3f}", str(row["dropped"]))
+        table.add_row(name, *cells)
+    Console(width=110).print(table)
+    known = [pair for pair in pairs if set(pair) <= set(found)]
+    series = {name: {title: losses(records)} for name, records in found.items()}
+    compared = compare_all(series, known, rng=np.random.default_rng(0))
+    for c in compared:
+        print(
+            f"{c.first} -> {c.second}: {c.difference:+.4g} [{c.low:+.4g}, {c.high:+.4g}] cm^2, "
+            f"p of the mean {c.p_mean:.3g}, of ranks {c.p_ranks:.3g}: {c.verdict}"
+        )
+    return report | {"tests": [asdict(c) for c in compared]}
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="20 tasks")
@@ -133,64 +203,11 @@ def main() -> int:
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     torch.set_num_threads(1)
-    count = 20 if options.quick else options.tasks
-    see = Perceiver()
-    folder = options.output / f"seed_{options.seed}"
-    trained = {s: policy(folder, s, see) for s in ("nn", "nnm", "mdr", "cvx", "dlm", "dlm_biased")}
-    for title, stage, kind in ((CHECKED, "mdr", "proposals"), (GUESSED, "cvx", "best_guess")):
-        if (one := policy(folder, stage, see, kind)) is not None:
-            trained[title] = one
-    plain = StructuredModel(perceive=see)
-    rows: dict[str, Act] = {"no action": lambda s, v: idle_action(TaskBatch.of([s]))}
-    rows |= {
-        s if s in (CHECKED, GUESSED) else s.upper(): of_policy(p)
-        for s, p in trained.items()
-        if p is not None and s != "dlm_biased"
+    results = measured(options)
+    report = {
+        title: shown(title, found, BIASED_PAIRS if "biased" in title else PAIRS)
+        for title, found in results.items()
     }
-    rows |= {
-        "no learning": of_model(plain),
-        "expert": of_model(StructuredModel(planner=ExpertPlanner(), perceive=see)),
-        "oracle": lambda s, v: expert_action(TaskBatch.of([s])),
-    }
-    biased = {n: rows[n] for n in ("no action", "CVX", "DLM") if n in rows}
-    if (one := trained["dlm_biased"]) is not None:
-        biased["DLM for this camera"] = of_policy(one)
-    results: dict[str, dict[str, list[Record]]] = {}
-    for name in options.sets:
-        samples = fresh("4-6" if name == "biased" else name, count, SEED + 2, options.folder)
-        if name == "biased":
-            videos = [STATED.video(s.task.body, s.task.trajectory.poses, plain.camera) for s in samples]
-            results["4-6 facets, biased camera"] = run(biased, samples, videos, name)
-        else:
-            results[f"{name} facets"] = run(rows, samples, [s.video for s in samples], name)
-    report = {}
-    for title, found in results.items():
-        table = Table("", "mean", "median", "within", "dropped", title=title)
-        idle = losses(found["no action"]).mean()
-        report[title] = {}
-        for name, records in found.items():
-            loss, within = losses(records), float(np.mean([bool(r["within"]) for r in records]))
-            dropped = sum(bool(r["dropped"]) for r in records)
-            table.add_row(name, f"{loss.mean():.4g}", f"{np.median(loss):.2g}", f"{within:.3f}", str(dropped))
-            report[title][name] = {
-                "mean": float(loss.mean()),
-                "ratio": float(loss.mean() / idle),
-                "median": float(np.median(loss)),
-                "within": within,
-                "dropped": dropped,
-                "losses": loss.tolist(),
-            }
-        Console(width=110).print(table)
-        pairs = [p for p in (BIASED_PAIRS if "biased" in title else PAIRS) if set(p) <= set(found)]
-        compared = compare_all(
-            {n: {title: losses(r)} for n, r in found.items()}, pairs, rng=np.random.default_rng(0)
-        )
-        for c in compared:
-            print(
-                f"{c.first} -> {c.second}: {c.difference:+.4g} [{c.low:+.4g}, {c.high:+.4g}] cm^2, p of the mean {c.p_mean:.3g}, "
-                f"of ranks {c.p_ranks:.3g}: {c.verdict}"
-            )
-        report[title]["tests"] = [asdict(c) for c in compared]
     if options.json:
         options.json.write_text(json.dumps(report, indent=1))
     return 0
