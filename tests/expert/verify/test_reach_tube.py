@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from expert.grasping.problem import GraspProblem, Shape
+from expert.grasping.proposals import Search, goal_cells
 from expert.grasping.shapes import irregular_polygon
-from expert.grasping.synthesis import solve
 from expert.verify.dead_ends import dead_end_events
 from expert.verify.finger_path import FingerPath
+from expert.verify.grasp import verify_grasp
 from expert.verify.pockets import Pockets
 from expert.verify.reach_tube import COARSEST, reach_tube
 from tests.expert.grasping.experiments import closing_path
@@ -33,9 +34,10 @@ def test_pockets_are_free_and_lead_to_their_dead_end(seed: int) -> None:
 
 def test_a_flood_that_knows_the_pockets_keeps_out_of_them_with_cells_as_wide() -> None:
     shape = Shape(vertices=irregular_polygon(np.random.default_rng(0), 4))
-    answer = solve(GraspProblem(shape=shape, pose=np.zeros(3), half_ranges=HALF_RANGES), time_limit=300)
-    assert answer.status == "certified"
-    path = FingerPath(shape, np.zeros(3), answer.path)
+    problem = GraspProblem(shape=shape, pose=np.zeros(3), half_ranges=HALF_RANGES)
+    search = Search(problem, deadline=np.inf)
+    path = FingerPath(shape, np.zeros(3), search.frame.world(next(goal_cells(search)).path))
+    assert verify_grasp(problem, path.knots_w, time_limit=np.inf).verdict == "certified"
     events = [e for e in dead_end_events(path) if abs(e.first[2]) < HALF_RANGES[0]]
     limits = HALF_RANGES[:-1] + np.radians(2)
     blind = reach_tube(path, limits, COARSEST, np.inf)
