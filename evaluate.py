@@ -15,16 +15,16 @@ from rich.console import Console
 
 from datasets.entry import entry_point
 from datasets.store import write_whole
-from dlm.checkpoint import About, load, restore_weights
 from dlm.evaluation.baselines import unlearned
 from dlm.evaluation.extras import read_extras
 from dlm.evaluation.report import png
 from dlm.evaluation.settle import settle
 from dlm.evaluation.study import Study, Trained
-from dlm.models import Policy
+from dlm.policy import Policy
 from dlm.tasks import TaskBatch, read_all
-from dlm.training import Stage
-from expert.types import require
+from dlm.training.checkpoint import About, load, restore_weights
+from dlm.training.stage import Stage
+from expert.world.values import require
 
 STAGES = ("nn", "nnm", "mdr", "cvx", "dlm")
 

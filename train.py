@@ -16,14 +16,15 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
 from datasets.entry import entry_point
-from dlm.checkpoint import load, read_about, restore_weights
 from dlm.evaluation.watch import watch
-from dlm.models import Policy
-from dlm.parallel import chains, run_side_by_side
+from dlm.policy import Policy
 from dlm.tasks import TaskBatch, read_all
-from dlm.training import Stage, Training, fit
+from dlm.training.checkpoint import load, read_about, restore_weights
+from dlm.training.loop import Training, fit
+from dlm.training.parallel import chains, run_side_by_side
+from dlm.training.stage import Stage
 from expert.errors import InvalidProblem
-from expert.types import require
+from expert.world.values import require
 
 
 @entry_point("train")

@@ -10,7 +10,7 @@ import numpy as np
 
 from datasets.render import Colour, Frames, Palette
 from expert.geometry.pose import Array
-from expert.types import require
+from expert.world.values import require
 
 
 def noisy(video: Frames, deviation: float, rng: np.random.Generator) -> Frames:

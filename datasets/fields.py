@@ -10,7 +10,9 @@ from datasets.motions import Tasks
 from datasets.parameters import EXTERNAL_CONTACTS, MechanicalParameters
 from datasets.specification import Sample
 from expert.errors import InvalidProblem
-from expert.types import Body, ContactForce, Plan, Trajectory
+from expert.problems.contact import ContactForce, Plan
+from expert.world.motion import Trajectory
+from expert.world.shape import Body
 
 NO_VERTEX = -1
 """Vertex of an absent floor contact."""

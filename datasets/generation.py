@@ -38,7 +38,7 @@ from datasets.store import (
     write_whole,
 )
 from expert.errors import InvalidProblem, SolverFailed
-from expert.types import require
+from expert.world.values import require
 
 PACKAGES = ("certified-manipulation", "numpy", "scipy", "shapely", "numba", "daqp", "opencv-python-headless")
 

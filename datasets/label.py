@@ -6,8 +6,9 @@ import numpy as np
 
 from expert.contact import solve
 from expert.errors import SolverFailed
-from expert.types import ContactTask, Plan, require
-from expert.verify.plan import check_plan
+from expert.problems.contact import ContactTask, Plan
+from expert.verify.plan.check import check_plan
+from expert.world.values import require
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,16 +11,13 @@ import numpy as np
 from datasets.shapes import ShapeFamily, Shapes, stable_angles
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, rotation, to_world
-from expert.types import (
-    Body,
-    ContactTask,
-    Environment,
-    Fingers,
-    HalfPlane,
-    Robustness,
-    Trajectory,
-    require,
-)
+from expert.problems.contact import ContactTask, Robustness
+from expert.world.environment import Environment
+from expert.world.fingers import Fingers
+from expert.world.motion import Trajectory
+from expert.world.shape import Body
+from expert.world.values import require
+from expert.world.walls import HalfPlane
 
 ATTEMPTS = 200
 AIR = 1e-3

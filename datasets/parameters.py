@@ -9,7 +9,8 @@ from expert.contact.model import region_rows, rho_limits, wall_rows
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
 from expert.mechanics import ExternalContact, external_contacts, friction_rays, inertial_wrench
-from expert.types import FREE, ContactTask, IntArray, Plan, require
+from expert.problems.contact import FREE, ContactTask, Plan
+from expert.world.values import IntArray, require
 
 EXTERNAL_CONTACTS = 2
 REGION_ROWS = 4

@@ -11,7 +11,7 @@ import numpy as np
 
 from expert.geometry.polygon import facet_frames
 from expert.geometry.pose import Array, to_world
-from expert.types import require
+from expert.world.values import require
 
 Frames = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 Colour = tuple[int, int, int]

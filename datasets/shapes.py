@@ -9,7 +9,7 @@ import shapely
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import crossing_edges, diameter, facets, mass_properties, signed_area
 from expert.geometry.pose import Array, cross, rotation
-from expert.types import readonly, require
+from expert.world.values import readonly, require
 
 ATTEMPTS = 10_000
 STABLE_SHARE = 0.15

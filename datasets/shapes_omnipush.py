@@ -11,7 +11,7 @@ import numpy as np
 from datasets.shapes import check_diameter
 from expert.geometry.polygon import diameter, mass_properties
 from expert.geometry.pose import Array, rotation
-from expert.types import readonly, require
+from expert.world.values import readonly, require
 
 Side = Literal["concave", "triangular", "rectangular", "circular"]
 SIDES: tuple[Side, ...] = get_args(Side)

@@ -12,7 +12,8 @@ from datasets.parameters import MechanicalParameters, parameters_of
 from datasets.render import Camera, Frames, Palette, render
 from datasets.shapes import ShapeFamily, Shapes
 from expert.errors import InvalidProblem, SolverFailed
-from expert.types import ContactTask, Plan, require
+from expert.problems.contact import ContactTask, Plan
+from expert.world.values import require
 
 ATTEMPTS = 100
 """Draws of a shape and a motion before a task is given up."""

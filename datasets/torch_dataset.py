@@ -12,7 +12,7 @@ from datasets.motions import FAMILIES
 from datasets.specification import Sample
 from datasets.store import DataSet, read_dataset
 from expert.errors import InvalidProblem
-from expert.types import ContactTask
+from expert.problems.contact import ContactTask
 
 STATUSES = ("optimal", "feasible")
 

@@ -3,7 +3,7 @@
 import torch
 from torch import Tensor
 
-from dlm.inverse_dynamics import Action
+from dlm.inverse_dynamics.layer import Action
 from dlm.simulator import SimulatorSettings, rollout
 from dlm.tasks import TaskBatch
 

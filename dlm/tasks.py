@@ -10,9 +10,9 @@ from torch import Tensor
 
 from datasets.specification import Sample
 from datasets.store import read_dataset
-from dlm.parameters import ParameterBatch
+from dlm.inverse_dynamics.parameters import ParameterBatch
 from dlm.simulator.scene import SceneBatch
-from expert.types import require
+from expert.world.values import require
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -60,13 +60,13 @@ KINDS: dict[str, Kind] = {
     "contact_trajectory": Kind(
         format="expert.files.contact_trajectory",
         solve="expert.contact:solve",
-        verify="expert.verify.plan:verify",
+        verify="expert.verify.plan.check:verify",
         draw="expert.drawing.contact_trajectory:draw",
     ),
     "cage": Kind(
         format="expert.files.cage",
         solve="expert.caging.synthesis:solve",
-        verify="expert.verify.cage:verify",
+        verify="expert.verify.cage.check:verify",
         draw="expert.drawing.cage:draw",
         solved=("caged",),
         views=("all", "workspace", "slice", "component"),
@@ -74,7 +74,7 @@ KINDS: dict[str, Kind] = {
     "certified_grasp": Kind(
         format="expert.files.certified_grasp",
         solve="expert.grasping.synthesis:solve",
-        verify="expert.verify.grasp:verify",
+        verify="expert.verify.grasp.check:verify",
         draw="expert.drawing.certified_grasp:draw",
         solved=("certified",),
     ),

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from expert.geometry.pose import Array, cross, perpendicular, to_world
-from expert.types import SUPPORT, ContactTask, IntArray
+from expert.problems.contact import SUPPORT, ContactTask
+from expert.world.values import IntArray
 
 SUPPORT_RAYS = 8
 

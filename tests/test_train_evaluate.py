@@ -22,7 +22,7 @@ from tensorboard.backend.event_processing.event_accumulator import EventAccumula
 import evaluate
 import train
 from datasets.store import read_manifest, write_manifest
-from dlm.checkpoint import load, read_about
+from dlm.training.checkpoint import load, read_about
 
 ROOT = Path(__file__).resolve().parent.parent
 STAGES = ["nn", "nnm", "mdr", "cvx", "dlm"]

@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image
 
 from dlm.execution import PUSHING
-from dlm.inverse_dynamics import Action
+from dlm.inverse_dynamics.layer import Action
 from dlm.simulator import SimulatorSettings
 from dlm.simulator.replay import Replay, replay
 from dlm.tasks import TaskBatch

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from datasets.render import Frames
 from dlm.execution import idle_where_unsolved
-from dlm.inverse_dynamics import Action
+from dlm.inverse_dynamics.layer import Action
 from dlm.structured import ExpertPlanner, StructuredModel
 from dlm.structured.policies import joined, unsolved
 from dlm.tasks import TaskBatch

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from dlm.training import Row
+from dlm.training.loop import Row
 
 COLOURS = {"nn": "#c44e52", "nnm": "#dd8452", "mdr": "#4c72b0", "cvx": "#2e8b57", "dlm": "#8172b3"}
 LINES = {"train": "-", "finetune": "-", "test": "--", "family": ":"}

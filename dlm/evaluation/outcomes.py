@@ -7,9 +7,9 @@ import torch
 from numpy.typing import NDArray
 
 from dlm.execution import idle_where_unsolved, simulate
-from dlm.inverse_dynamics import Action
+from dlm.inverse_dynamics.layer import Action
 from dlm.metrics import finger_trajectory_loss, object_trajectory_loss, rms_errors, within
-from dlm.models import Policy
+from dlm.policy import Policy
 from dlm.simulator import SimulatorSettings
 from dlm.tasks import TaskBatch
 from expert.geometry.pose import Array

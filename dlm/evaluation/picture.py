@@ -8,9 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dlm.evaluation.outcomes import Outcome
-from dlm.models import Policy, ProgramPolicy
-from dlm.parameters import ParameterBatch
+from dlm.inverse_dynamics.parameters import ParameterBatch
+from dlm.policy import Policy
 from dlm.tasks import TaskBatch
+from dlm.thesis.policies import ProgramPolicy
 from expert.geometry.pose import Array, to_world
 
 FINGER_COLOURS = ("tab:red", "tab:blue", "tab:purple", "tab:green")

@@ -7,7 +7,7 @@ evaluation nothing is dropped, so that on small data sets a network in evaluatio
 import torch
 from torch import nn
 
-from dlm.models import Policy
+from dlm.policy import Policy
 from dlm.tasks import TaskBatch
 
 

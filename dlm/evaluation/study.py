@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dlm.checkpoint import About, versions
 from dlm.evaluation.animation import animate, input_film
 from dlm.evaluation.curves import curves_figure
 from dlm.evaluation.extras import Extra
@@ -18,11 +17,12 @@ from dlm.evaluation.significance import Comparison, compare_all
 from dlm.evaluation.table import Cell, Line, Table
 from dlm.evaluation.timing import backward_seconds, expert_seconds, forward_seconds
 from dlm.execution import expert_action, idle_action
-from dlm.inverse_dynamics import Action
-from dlm.models import Policy
+from dlm.inverse_dynamics.layer import Action
+from dlm.policy import Policy
 from dlm.simulator import SimulatorSettings
 from dlm.tasks import TaskBatch
-from dlm.training import Stage
+from dlm.training.checkpoint import About, versions
+from dlm.training.stage import Stage
 
 Seconds = tuple[float | None, float | None]
 """Forward and backward, per task."""

@@ -8,8 +8,7 @@ from statistics import median
 
 import torch
 
-from dlm.losses import Loss
-from dlm.models import Policy
+from dlm.policy import Loss, Policy
 from dlm.tasks import TaskBatch
 from expert.contact import solve
 

@@ -7,10 +7,10 @@ from matplotlib.figure import Figure
 
 from dlm.evaluation.outcomes import act, execute
 from dlm.evaluation.picture import derendered, task_figure
-from dlm.models import Policy
+from dlm.policy import Policy
 from dlm.simulator import SimulatorSettings
 from dlm.tasks import TaskBatch
-from dlm.training import Row, Watch
+from dlm.training.loop import Row, Watch
 
 MOST = 40
 """Tasks of each data set that curves are measured on."""

@@ -17,7 +17,7 @@ from dlm.infer.segmentation import Segmentation
 from dlm.structured import StructuredModel
 from dlm.structured.weights import SHIPPED, trained_model
 from expert.files.document import save
-from expert.types import require
+from expert.world.values import require
 
 NO_PLAN = 4
 NUMBERS = (

@@ -10,7 +10,7 @@ import numpy as np
 from datasets.render import Frames
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
-from expert.types import require
+from expert.world.values import require
 
 os.environ.setdefault(
     "OPENCV_FFMPEG_LOGLEVEL", "-8"

@@ -22,7 +22,7 @@ from expert.drawing.canvas import (
     save_frames,
 )
 from expert.geometry.pose import Array, to_world
-from expert.types import ContactTask, Plan
+from expert.problems.contact import ContactTask, Plan
 
 FRAME_STRIDE, HOLD, RATE = 2, 10, 10.0
 """Substeps per frame of the animation, frames for which the last one stands still, frames per second."""

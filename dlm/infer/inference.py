@@ -21,7 +21,8 @@ from expert.files import problem_of
 from expert.files.contact_plan import answer_fields
 from expert.files.contact_task import task_fields
 from expert.geometry.polygon import diameter
-from expert.types import ContactTask, Plan, require
+from expert.problems.contact import ContactTask, Plan
+from expert.world.values import require
 
 Refine = Literal["expert"]
 WITHIN_MM, WITHIN_DEG = 2.0, 2.0

@@ -12,7 +12,7 @@ from PIL import Image
 
 from datasets.render import Frames, Palette
 from expert.errors import InvalidProblem
-from expert.types import require
+from expert.world.values import require
 
 Mask = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 

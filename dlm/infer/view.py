@@ -10,7 +10,7 @@ from dlm.perception.appearance import separate
 from dlm.perception.segment import segment
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
-from expert.types import require
+from expert.world.values import require
 
 COARSE = 96
 """Side of the picture in which the object is looked for [pixels]."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from expert.geometry.polygon import NDArrayBool
 from expert.geometry.pose import Array
-from expert.types import IntArray
+from expert.world.values import IntArray
 
 LEAST_NOISE = 0.5
 """Standard deviation that is assumed of a pixel at least [grey levels]: it is rounded."""

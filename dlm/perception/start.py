@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter
 from dlm.perception.fit import Observation, Scene, crossed, fit
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
-from expert.types import IntArray
+from expert.world.values import IntArray
 
 HARMONICS = 16
 ANGLES = 720

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from expert.geometry.pose import Array
-from expert.types import require
+from expert.world.values import require
 
 Status = Literal["ok", "poor_fit"]
 

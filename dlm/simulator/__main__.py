@@ -20,7 +20,8 @@ from dlm.simulator.replay import replay
 from dlm.simulator.settings import SimulatorSettings
 from expert.errors import ExpertError, InvalidProblem
 from expert.files import read_solution
-from expert.types import ContactTask, Plan, require
+from expert.problems.contact import ContactTask, Plan
+from expert.world.values import require
 
 MM, DEG = 2.0, 2.0
 

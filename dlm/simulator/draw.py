@@ -25,7 +25,7 @@ from expert.drawing.canvas import (
     suffix,
 )
 from expert.geometry.pose import Array, to_world
-from expert.types import ContactTask
+from expert.problems.contact import ContactTask
 
 LONGEST_ARROW = 0.6
 """Length of the largest force over the object's size."""

@@ -10,7 +10,7 @@ from dlm.simulator.differences import difference_batch
 from dlm.simulator.rollout import execute_batch
 from dlm.simulator.scene import SceneBatch
 from dlm.simulator.settings import SimulatorSettings
-from expert.types import require
+from expert.world.values import require
 
 LOADED_SHARE = 1e-6
 """Without contact flags a finger counts as loaded where its force exceeds this share of the object's weight."""

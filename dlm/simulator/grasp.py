@@ -15,8 +15,11 @@ from dlm.simulator.scene import Scene, SceneBatch
 from dlm.simulator.settings import SimulatorSettings
 from dlm.simulator.step import work_for
 from expert.geometry.pose import Array, rotation
-from expert.grasping.problem import GraspProblem
-from expert.types import Body, Environment, Trajectory, readonly
+from expert.problems.grasp import GraspProblem
+from expert.world.environment import Environment
+from expert.world.motion import Trajectory
+from expert.world.shape import Body
+from expert.world.values import readonly
 
 MASS, SUPPORT_FRICTION = 0.1, 0.3
 STIFFNESS_PER_MASS = 1e6

@@ -18,7 +18,7 @@ from dlm.simulator.settings import SimulatorSettings
 from expert.errors import ExpertError
 from expert.geometry.convex import convex_pieces
 from expert.geometry.pose import Array
-from expert.types import ContactTask
+from expert.problems.contact import ContactTask
 
 BEAD = 1e-4
 """Radius of the beads at the vertices [m]; walls are set back by it."""

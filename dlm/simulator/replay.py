@@ -14,7 +14,8 @@ from dlm.simulator.scene import Scene, SceneBatch
 from dlm.simulator.settings import Physics, SimulatorSettings
 from dlm.simulator.step import Work, solve_step, work_for
 from expert.geometry.pose import Array
-from expert.types import ContactTask, readonly, require
+from expert.problems.contact import ContactTask
+from expert.world.values import readonly, require
 
 
 @dataclass(frozen=True, kw_only=True)

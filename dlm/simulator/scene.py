@@ -8,7 +8,12 @@ import numpy as np
 
 from expert.geometry.polygon import facet_frames, facets, reflex_vertices
 from expert.geometry.pose import Array
-from expert.types import Body, ContactTask, Environment, HalfPlane, Trajectory, require
+from expert.problems.contact import ContactTask
+from expert.world.environment import Environment
+from expert.world.motion import Trajectory
+from expert.world.shape import Body
+from expert.world.values import require
+from expert.world.walls import HalfPlane
 
 STIFFNESS_PER_MASS = 1e5
 """Finger stiffness over the object's mass [N/m per kg]: planned forces of m g deflect a finger by 0.1 mm."""

@@ -5,7 +5,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from expert.types import require
+from expert.world.values import require
 
 Gradient = Literal["finite_difference", "implicit"]
 

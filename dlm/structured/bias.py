@@ -9,7 +9,8 @@ from datasets.disturb import blurred
 from datasets.render import Camera, Frames, render
 from dlm.structured.calibration import inset
 from dlm.tasks import TaskBatch
-from expert.types import Body, require
+from expert.world.shape import Body
+from expert.world.values import require
 
 
 @dataclass(frozen=True, kw_only=True)

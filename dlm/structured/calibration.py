@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from dlm.perception import Perceived
 from expert.geometry.polygon import facet_frames
 from expert.geometry.pose import Array, to_world
-from expert.types import require
+from expert.world.values import require
 
 
 @dataclass(frozen=True, kw_only=True)

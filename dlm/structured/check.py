@@ -14,13 +14,14 @@ from expert.contact.leaf import narrow, relax
 from expert.contact.model import Model, model_of
 from expert.contact.plan_at import all_forces, positions_at
 from expert.contact.polish import polish
-from expert.contact.qp import compiled
 from expert.contact.recovery import plan_cost, wrench_residual
 from expert.contact.search import Best, Tree
 from expert.contact.sequence import sequence_of
 from expert.errors import SolverFailed
 from expert.geometry.pose import Array
-from expert.types import ContactTask, IntArray, Plan
+from expert.numeric.qp import compiled
+from expert.problems.contact import ContactTask, Plan
+from expert.world.values import IntArray
 
 ROUNDS = 12
 """Master programs per class in the first pass."""

@@ -10,7 +10,8 @@ from functools import cached_property
 
 import numpy as np
 
-from expert.types import FREE, IntArray, require
+from expert.problems.contact import FREE
+from expert.world.values import IntArray, require
 
 Mask = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 

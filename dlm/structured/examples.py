@@ -11,7 +11,8 @@ import numpy as np
 from datasets.specification import Sample
 from dlm.structured.classes import Schedules
 from expert.geometry.pose import Array, to_body
-from expert.types import FREE, IntArray
+from expert.problems.contact import FREE
+from expert.world.values import IntArray
 
 MOST_FACETS = 12
 SPLIT_BETWEEN = (0.25, 0.75)

@@ -11,7 +11,7 @@ from torch.nn.functional import cross_entropy
 from datasets.specification import Sample
 from dlm.execution import idle_where_unsolved, simulate
 from dlm.metrics import object_trajectory_loss
-from dlm.models import Policy
+from dlm.policy import Policy
 from dlm.simulator import SimulatorSettings
 from dlm.structured.bias import Bias
 from dlm.structured.calibration import Calibration

@@ -8,14 +8,14 @@ import torch
 
 from datasets.parameters import MechanicalParameters, parameters_of
 from datasets.render import Camera, Frames
-from dlm.inverse_dynamics import Action
+from dlm.inverse_dynamics.layer import Action
 from dlm.perception import Perceived, PerceptionSettings, perceive
 from dlm.structured.calibration import Calibration, deflated
 from dlm.structured.planners import Answer, ClassPlanner, Planner
 from dlm.structured.planning import Planning
 from dlm.structured.trial import Trial
 from expert.errors import InvalidProblem, SolverFailed
-from expert.types import ContactTask, Plan
+from expert.problems.contact import ContactTask, Plan
 
 Status = Literal["planned", "risky", "poor_fit", "no_plan"]
 

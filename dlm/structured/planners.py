@@ -11,7 +11,8 @@ from dlm.structured.check import NODES, check
 from dlm.structured.classes import Schedules
 from dlm.structured.trial import Trial
 from expert.contact.model import model_of
-from expert.types import ContactTask, IntArray, Plan
+from expert.problems.contact import ContactTask, Plan
+from expert.world.values import IntArray
 
 
 class Answer(NamedTuple):

@@ -8,7 +8,10 @@ import numpy as np
 from datasets.motions import Tasks
 from dlm.perception import Perceived
 from expert.geometry.pose import Array, to_world
-from expert.types import Body, ContactTask, Trajectory, require
+from expert.problems.contact import ContactTask
+from expert.world.motion import Trajectory
+from expert.world.shape import Body
+from expert.world.values import require
 
 FACET_MARGIN = 0.2
 """Share of a facet kept free at either end: perceived corners are off by a part of a pixel, and may be superfluous."""

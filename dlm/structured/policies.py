@@ -9,9 +9,9 @@ import torch
 from torch import Tensor, nn
 
 from datasets.render import Camera, Frames
-from dlm.inverse_dynamics import Action, InverseDynamics
-from dlm.models import Kind, Policy, seeded
+from dlm.inverse_dynamics.layer import Action, InverseDynamics
 from dlm.perception import Perceived, PerceptionSettings, perceive
+from dlm.policy import Kind, Policy, seeded
 from dlm.structured.calibration import NAMES, Calibration
 from dlm.structured.classes import MEASURED, Schedules
 from dlm.structured.model import Planned, StructuredModel
@@ -19,7 +19,8 @@ from dlm.structured.planners import ClassPlanner
 from dlm.structured.planning import Planning
 from dlm.structured.scorer import Encoder, Scorer, stack
 from expert.errors import InvalidProblem
-from expert.types import ContactTask, IntArray, require
+from expert.problems.contact import ContactTask
+from expert.world.values import IntArray, require
 
 FORCE = 1.0
 """Unit of a regressor's forces [N]."""

@@ -10,7 +10,7 @@ from datasets.motions import Tasks
 from dlm.structured.classes import Schedules
 from dlm.structured.features import FACET_NUMBERS, STEP_NUMBERS, Geometry, facet_tokens, step_tokens
 from expert.geometry.pose import Array
-from expert.types import IntArray
+from expert.world.values import IntArray
 
 
 def stack(geometries: Sequence[tuple[Array, Array]]) -> Geometry:

@@ -14,7 +14,8 @@ from dlm.metrics import object_trajectory_loss
 from dlm.simulator import Scene, SceneBatch, SimulatorSettings, rollout
 from dlm.structured.calibration import inset
 from expert.geometry.pose import Array
-from expert.types import ContactTask, Plan, require
+from expert.problems.contact import ContactTask, Plan
+from expert.world.values import require
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import torch
 
-from dlm.checkpoint import load, restore_weights
 from dlm.structured.model import StructuredModel
 from dlm.structured.policies import StructuredArchitecture
 from dlm.structured.trial import Trial
+from dlm.training.checkpoint import load, restore_weights
 
 SHIPPED = Path(__file__).with_name("weights.safetensors")
 COMMAND = "python train.py experiment=large"

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from expert.caging.problem import CageProblem, Gripper
 from expert.caging.requirements import TRIPOD
 from expert.geometry.polygon import facet_frames, facets, reflex_vertices, signed_distance
 from expert.geometry.pose import Array, cross, rotation, to_body
+from expert.problems.cage import CageProblem
+from expert.world.fingers import Gripper
 
 CLEARANCES = (0.03, 0.015, 0.008, 0.005)
 """Of fingers from the object, relative to its size, in this order."""

@@ -1,5 +1,5 @@
 """Swept-Minkowski MIP: fingers whose obstacles form a loop around the start at all orientations of a range [L, U] and a
-filled loop at its ends.  All lengths relative (`expert.caging.frame`).
+filled loop at its ends.  All lengths relative (`expert.world.frame`).
 
 p[n]          finger n                                H[n][i, j]   exit piece i of n meets entry piece j of n + 1
 R[n, r]       region of finger n at the start         W[n, r, (i, j)] = 1 iff finger n is in region r with entry i, exit j
@@ -17,12 +17,12 @@ from typing import Literal
 
 import numpy as np
 
-from expert.caging.solution import Meeting
-from expert.caging.swept import REACH, SweptGeometry
 from expert.geometry.pose import Array, rotation
+from expert.loops.swept import REACH, SweptGeometry
 from expert.mip.backends import Solver, Status
 from expert.mip.linear import LinearModel, Term
-from expert.types import IntArray
+from expert.problems.cage import Meeting
+from expert.world.values import IntArray
 
 MOST_TURNS = 2
 ANGLE_MARGIN = 1e-3

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from expert.caging.problem import CageProblem
 from expert.caging.requirements import TRIPOD, objective
 from expert.geometry.pose import Array
+from expert.problems.cage import CageProblem
 
 STEPS = (0.2, 0.1, 0.05, 0.025, 0.0125, 0.006)
 """Largest move of a finger, relative to the object's size."""

@@ -2,13 +2,14 @@
 
 import numpy as np
 
-from expert.caging.frame import Frame
 from expert.caging.model import SweptModel
-from expert.caging.problem import CageProblem, Gripper
-from expert.caging.swept import REACH
 from expert.geometry.pose import Array, rotation
+from expert.loops.swept import REACH
 from expert.mip.backends import Solver
 from expert.mip.linear import Term
+from expert.problems.cage import CageProblem
+from expert.world.fingers import Gripper
+from expert.world.frame import Frame
 
 DIRECTIONS = 16
 """Distances are bounded in so many directions."""

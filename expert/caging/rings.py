@@ -5,9 +5,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from expert.caging.frame import Frame
 from expert.caging.model import Element, SweptModel
-from expert.caging.problem import CageProblem
+from expert.problems.cage import CageProblem
+from expert.world.frame import Frame
 
 
 def rings(problem: CageProblem, frame: Frame) -> Iterator[list[Element]]:

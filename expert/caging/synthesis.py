@@ -13,21 +13,20 @@ from typing import Literal
 import numpy as np
 
 from expert.caging.closures import Closures, directions
-from expert.caging.frame import Frame
 from expert.caging.immobilise import candidates
 from expert.caging.model import SweptModel
 from expert.caging.polish import STEPS, improvements
-from expert.caging.problem import Arrangement, CageProblem
 from expert.caging.requirements import require
 from expert.caging.rings import break_symmetry, hubs, labelled, rings
-from expert.caging.solution import CageSolution, CageStatus
-from expert.caging.swept import SweptGeometry
 from expert.caging.tally import Tally
 from expert.caging.thesis import ThesisModel, slices
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, to_world
+from expert.loops.swept import SweptGeometry
 from expert.mip.backends import Solver
-from expert.verify.cage import verify_cage
+from expert.problems.cage import Arrangement, CageProblem, CageSolution, CageStatus
+from expert.verify.cage.check import verify_cage
+from expert.world.frame import Frame
 
 Method = Literal["swept", "model", "thesis"]
 """swept: the model, and immobilising grasps where it is slow; model: the model alone; thesis: MIP1."""

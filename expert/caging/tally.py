@@ -3,13 +3,12 @@
 import time
 from dataclasses import dataclass, field, replace
 
-from expert.caging.problem import CageProblem
 from expert.caging.requirements import objective
-from expert.caging.solution import CageSolution, Meeting
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
-from expert.verify.cage import CageReport, verify_cage
-from expert.verify.cage_claims import unmet_claim
+from expert.problems.cage import CageProblem, CageSolution, Meeting
+from expert.verify.cage.check import CageReport, verify_cage
+from expert.verify.cage.claims import unmet_claim
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""MIP1 of the thesis (5.1.7), errata mended: a baseline whose answers are unverified until `expert.verify.cage` has spoken.
+"""MIP1 of the thesis (5.1.7), errata mended: a baseline whose answers are unverified until `expert.verify.cage.check` has spoken.
 
 Its slices decide what it can find: limit orientations must lie on them, and the object must touch there where it stands.
 Between a slice and a limit, and around other corners of the object, it proves nothing.
@@ -8,7 +8,6 @@ import cvxpy as cp
 import numpy as np
 
 from expert.caging.model import Proposal
-from expert.caging.solution import Meeting
 from expert.caging.thesis_blocks import (
     Variables,
     continuous_boundary,
@@ -27,6 +26,7 @@ from expert.geometry.pose import Array
 from expert.mip.backends import Solver
 from expert.mip.block import Block
 from expert.mip.solve import solve as solve_program
+from expert.problems.cage import Meeting
 
 
 def slices(below: float, above: float, count: int) -> Array:

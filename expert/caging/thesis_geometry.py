@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expert.caging.swept import SweptGeometry
 from expert.geometry.convex import free_regions
 from expert.geometry.cover import half_planes
 from expert.geometry.polygon import facet_frames, facets, reflex_vertices
 from expert.geometry.pose import Array, perpendicular
+from expert.loops.swept import SweptGeometry
 
 SPANNING = 0.05
 """Normals of limit contacts positively span the plane with weights of at least this (they sum to 1)."""

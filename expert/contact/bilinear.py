@@ -17,7 +17,7 @@ from expert.contact.scaled import ScaledTask
 from expert.errors import SolverFailed
 from expert.geometry.pose import Array, cross
 from expert.mip.backends import scip_answer, scip_limits
-from expert.types import FREE, ContactTask, Plan, Status
+from expert.problems.contact import FREE, ContactTask, Plan, Status
 
 TOLERANCE = 1e-7
 """Absolute feasibility tolerance asked of SCIP, in m g and m g L; its linear solver warns below."""

@@ -19,7 +19,12 @@ from expert.contact.search import NEGLIGIBLE, Outcome, Search
 from expert.contact.sequence import sequence_of
 from expert.errors import SolverFailed
 from expert.geometry.pose import Array
-from expert.types import Body, ContactTask, Environment, Fingers, HalfPlane, Plan, Status, Trajectory
+from expert.problems.contact import ContactTask, Plan, Status
+from expert.world.environment import Environment
+from expert.world.fingers import Fingers
+from expert.world.motion import Trajectory
+from expert.world.shape import Body
+from expert.world.walls import HalfPlane
 
 RESIDUAL = 1e-8
 """Largest Newton-Euler residual of a plan that is handed out, over m g and m g L."""

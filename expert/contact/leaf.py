@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 from expert.contact.model import Model
-from expert.contact.qp import INFEASIBLE, SOLVED, compiled, solve_qp
 from expert.contact.sequence import (
     FLAT,
     Sequence,
@@ -23,7 +22,8 @@ from expert.contact.sequence import (
 )
 from expert.contact.steps import CERTAIN, environment_reach, gain, reach, shortfall, solve_step, tighten
 from expert.geometry.pose import Array
-from expert.types import IntArray
+from expert.numeric.qp import INFEASIBLE, SOLVED, compiled, solve_qp
+from expert.world.values import IntArray
 
 THETA_RIDGE = 1e-8
 """Curvature of the variables that stand for the steps' costs; the bound is recomputed without it."""

@@ -7,7 +7,8 @@ import numpy as np
 from expert.geometry.convex import free_regions
 from expert.geometry.pose import Array, rotation
 from expert.mechanics import ExternalContact, external_contacts, required_wrench, wrench_about
-from expert.types import SUPPORT, ContactTask, IntArray
+from expert.problems.contact import SUPPORT, ContactTask
+from expert.world.values import IntArray
 
 QP_ITERATIONS = 400
 

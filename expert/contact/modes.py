@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from expert.contact.model import Model
-from expert.contact.qp import INFEASIBLE, compiled
 from expert.contact.steps import solve_step
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
-from expert.types import IntArray
+from expert.numeric.qp import INFEASIBLE, compiled
+from expert.world.values import IntArray
 
 MOST_STATES = 60_000
 """Joint states of all fingers that the automaton may have."""

@@ -6,13 +6,13 @@ import numpy as np
 
 from expert.contact.leaf import pushes
 from expert.contact.model import Model
-from expert.contact.qp import SOLVED, compiled
 from expert.contact.sequence import Sequence, smoothing
 from expert.contact.steps import rays_per_end, solve_step
 from expert.errors import SolverFailed
 from expert.geometry.pose import Array
 from expert.mechanics import external_contacts
-from expert.types import SUPPORT, ContactForce, ContactTask
+from expert.numeric.qp import SOLVED, compiled
+from expert.problems.contact import SUPPORT, ContactForce, ContactTask
 
 
 class Forces(NamedTuple):

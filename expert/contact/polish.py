@@ -14,11 +14,11 @@ import numpy as np
 from expert.contact.leaf import pushes
 from expert.contact.model import Model
 from expert.contact.plan_at import forces_at
-from expert.contact.qp import SOLVED, compiled, solve_qp
 from expert.contact.sequence import Sequence, nearest_region, standing_rows
 from expert.contact.steps import RIDGE, rays_per_end, solve_step, step_program
 from expert.geometry.pose import Array
-from expert.types import IntArray
+from expert.numeric.qp import SOLVED, compiled, solve_qp
+from expert.world.values import IntArray
 
 STATIONARY = 1e-9
 """A plan is stationary when its own convex program moves no variable by more (rho, and lengths in L)."""

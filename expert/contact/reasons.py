@@ -5,7 +5,7 @@ import numpy as np
 from expert.contact.model import Model
 from expert.contact.modes import step_costs
 from expert.geometry.pose import Array
-from expert.types import ContactTask
+from expert.problems.contact import ContactTask
 
 LARGEST_FRICTION = 2.0
 """No more finger friction than this is suggested."""

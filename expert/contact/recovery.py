@@ -8,7 +8,8 @@ from scipy.optimize import lsq_linear
 from expert.contact.scaled import ScaledTask, ray_size
 from expert.geometry.pose import Array, cross
 from expert.mechanics import external_contacts, inertial_wrench, wrench_about
-from expert.types import FREE, ContactForce, ContactTask, IntArray, Plan, Status
+from expert.problems.contact import FREE, ContactForce, ContactTask, Plan, Status
+from expert.world.values import IntArray
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 from expert.geometry.convex import free_regions
 from expert.geometry.pose import Array, rotation, to_world
 from expert.mechanics import ExternalContact, external_contacts, friction_rays, required_wrench, wrench_about
-from expert.types import ContactTask
+from expert.problems.contact import ContactTask
 
 
 @dataclass(frozen=True, kw_only=True)

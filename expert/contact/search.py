@@ -18,7 +18,8 @@ from expert.contact.modes import Moves, cost_to_go, last_costs, moves_of, step_c
 from expert.contact.polish import mend
 from expert.contact.sequence import Sequence, least_smoothing, sequence_of
 from expert.geometry.pose import Array
-from expert.types import FREE, IntArray
+from expert.problems.contact import FREE
+from expert.world.values import IntArray
 
 ROUNDS = 25
 """Master programs per visit of a complete sequence."""

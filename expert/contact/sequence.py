@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from expert.contact.model import Model
-from expert.contact.qp import INFEASIBLE, SOLVED, compiled, solve_qp
 from expert.geometry.pose import Array
-from expert.types import IntArray
+from expert.numeric.qp import INFEASIBLE, SOLVED, compiled, solve_qp
+from expert.world.values import IntArray
 
 FLAT = 1e-8
 """Curvature, relative to the smoothing weight, that holds directions without any cost near a reference."""

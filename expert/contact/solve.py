@@ -3,7 +3,7 @@
 from importlib import import_module
 
 from expert.errors import InvalidProblem
-from expert.types import ContactTask, Plan
+from expert.problems.contact import ContactTask, Plan
 
 METHODS = {
     "exact": "expert.contact.exact",

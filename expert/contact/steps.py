@@ -9,9 +9,9 @@ in closed form; the tolerance of the program's solver therefore never enters a b
 import numpy as np
 
 from expert.contact.model import Model
-from expert.contact.qp import FAILED, INFEASIBLE, SOLVED, compiled, solve_qp
 from expert.geometry.pose import Array
-from expert.types import IntArray
+from expert.numeric.qp import FAILED, INFEASIBLE, SOLVED, compiled, solve_qp
+from expert.world.values import IntArray
 
 RIDGE = 1e-9
 """Curvature given to reactions and to doubly described forces, in units of 1 / (m g)^2: reactions cost nothing."""

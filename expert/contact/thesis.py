@@ -29,7 +29,7 @@ from expert.mip.backends import Solver
 from expert.mip.block import Block
 from expert.mip.solve import Result
 from expert.mip.solve import solve as solve_program
-from expert.types import FREE, ContactTask, Plan, Status
+from expert.problems.contact import FREE, ContactTask, Plan, Status
 
 PLAN_STATUS: dict[str, Status] = {
     "optimal": "optimal",

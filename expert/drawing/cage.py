@@ -5,8 +5,6 @@ import os
 
 import numpy as np
 
-from expert.caging.problem import Arrangement, CageProblem
-from expert.caging.solution import CageSolution
 from expert.drawing.cage_component import draw_component
 from expert.drawing.cage_slice import draw_slice
 from expert.drawing.cage_workspace import draw_object, draw_workspace
@@ -22,7 +20,8 @@ from expert.drawing.canvas import (
 )
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, to_world
-from expert.verify.cage import CageReport, verify_cage
+from expert.problems.cage import Arrangement, CageProblem, CageSolution
+from expert.verify.cage.check import CageReport, verify_cage
 
 VIEWS = ("workspace", "slice", "component")
 RATE = 12.0

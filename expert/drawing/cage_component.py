@@ -6,11 +6,11 @@ from matplotlib import colormaps
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-from expert.caging.problem import Arrangement
 from expert.drawing.canvas import FINGER
 from expert.geometry.pose import Array
-from expert.verify.cage import CageReport
-from expert.verify.free_space import free_components
+from expert.problems.cage import Arrangement
+from expert.verify.cage.check import CageReport
+from expert.world.slices import free_components
 
 PATH = "#1f5fbf"
 SLICES = 49
@@ -78,7 +78,10 @@ def _lifted(ring: shapely.LinearRing, arrangement: Arrangement, height: float) -
 def linked_slices(arrangement: Arrangement, angles: Array) -> list[list[shapely.Polygon]]:
     """At each orientation the free components that a chain of overlapping ones links to the start."""
     start = int(np.abs(angles - arrangement.pose[2]).argmin())
-    slices = [free_components(arrangement, float(angle), bounded=True) for angle in angles]
+    slices = [
+        free_components(arrangement.shape, arrangement.fingers, arrangement.walls, float(angle))
+        for angle in angles
+    ]
     here = shapely.Point(arrangement.pose[:2]).buffer(1e-3 * arrangement.shape.size)
     reached: list[list[shapely.Polygon]] = [[] for _ in angles]
     reached[start] = [p for p in slices[start] if p.intersects(here)]

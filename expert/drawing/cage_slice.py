@@ -4,14 +4,13 @@ import numpy as np
 import shapely
 from matplotlib.axes import Axes
 
-from expert.caging.frame import Frame
-from expert.caging.problem import Arrangement
-from expert.caging.solution import CageSolution
-from expert.caging.swept import SweptGeometry
 from expert.drawing.cage_workspace import finger_colour
 from expert.drawing.canvas import EDGE, WALL, framed_axes, scale_bar
 from expert.geometry.pose import Array, rotation
-from expert.verify.free_space import free_components, obstacles_at
+from expert.loops.swept import SweptGeometry
+from expert.problems.cage import Arrangement, CageSolution
+from expert.world.frame import Frame
+from expert.world.slices import free_components, obstacles_at
 
 FREE, ELSEWHERE, START, LOOP = "#2b7fd0", "#d3e6f7", "#111111", "#111111"
 SMALL = 0.1
@@ -24,8 +23,8 @@ def draw_slice(axes: Axes, arrangement: Arrangement, answer: CageSolution | None
     Dashed: the loop of obstacles that the model found, where it names one.
     """
     angle = float(arrangement.pose[2])
-    obstacles = obstacles_at(arrangement, angle)
-    free = free_components(arrangement, angle)
+    obstacles = obstacles_at(arrangement.shape, arrangement.fingers, arrangement.walls, angle)
+    free = free_components(arrangement.shape, arrangement.fingers, arrangement.walls, angle)
     _draw_obstacles(axes, arrangement, obstacles)
     _draw_free(axes, arrangement, free)
     if answer is not None and answer.topology:

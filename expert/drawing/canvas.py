@@ -20,7 +20,7 @@ from PIL import Image
 from expert.errors import InvalidProblem
 from expert.files.document import write_atomically
 from expert.geometry.pose import Array, perpendicular
-from expert.types import HalfPlane
+from expert.world.walls import HalfPlane
 
 Image8 = NDArray[np.uint8]
 

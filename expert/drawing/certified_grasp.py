@@ -24,11 +24,11 @@ from expert.drawing.canvas import (
 )
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, to_world
-from expert.grasping.problem import GraspProblem, GraspSolution, arrangement_at
 from expert.grasping.sweeping import Sweep, sweep
-from expert.verify.finger_path import FingerPath
-from expert.verify.free_space import free_components, obstacles_at
-from expert.verify.start_set import StartSet
+from expert.problems.grasp import GraspProblem, GraspSolution, arrangement_at
+from expert.verify.grasp.finger_path import FingerPath
+from expert.verify.grasp.start_set import StartSet
+from expert.world.slices import free_components, obstacles_at
 
 START, GOAL, PATH = "#8d8678", "#7a3db8", "#1f5fbf"
 """Grey starts, purple goal, blue finger paths, as in the thesis's Fig. 5-28."""
@@ -103,11 +103,11 @@ def _draw_slices(axes: Axes, task: GraspProblem, answer: GraspSolution) -> None:
     """Free positions around the goal at its orientation, knot by knot, among the obstacles of the first."""
     angle, here = float(task.pose[2]), shapely.Point(task.pose[:2])
     first = arrangement_at(task, answer, 0.0)
-    for obstacle in obstacles_at(first, angle):
+    for obstacle in obstacles_at(first.shape, first.fingers, first.walls, angle):
         axes.fill(*np.array(obstacle.exterior.coords).T, color="#cfc9bd", ec=EDGE, lw=0.5, alpha=0.6)
     reach = 0.0
     for k in range(len(answer.path)):
-        for part in free_components(arrangement_at(task, answer, float(k)), angle):
+        for part in free_components(task.shape, answer.fingers(float(k)), first.walls, angle):
             if part.distance(here) < 1e-6 * task.shape.size:
                 outline = np.array(part.exterior.coords)
                 reach = max(reach, float(np.abs(outline - task.pose[:2]).max()))

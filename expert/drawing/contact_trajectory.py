@@ -25,7 +25,7 @@ from expert.drawing.canvas import (
     suffix,
 )
 from expert.geometry.pose import Array, to_body, to_world
-from expert.types import FREE, ContactTask, Plan
+from expert.problems.contact import FREE, ContactTask, Plan
 
 COLUMNS = 5
 FRAMES_PER_STEP, RATE = 6, 12.0

@@ -21,18 +21,22 @@ from rich.progress import track
 from expert.drawing.canvas import EDGE, FINGER, new_figure, plain_axes, save_figure, suffix
 from expert.drawing.certified_grasp import GOAL, PATH, START, draw_moment, draw_starts, executions
 from expert.errors import InvalidProblem
+from expert.files import read_problem
 from expert.files.document import save, writable
 from expert.geometry.polygon import mass_properties
 from expert.geometry.pose import Array, to_world
 from expert.grasping.force_closure import best_grasp, least_distance
-from expert.grasping.problem import GraspProblem, GraspSolution, Shape, arrangement_at
-from expert.grasping.shapes import grasp_shape, irregular_polygon
 from expert.grasping.sweeping import sweep
 from expert.grasping.synthesis import solve
-from expert.verify.finger_path import FingerPath
-from expert.verify.free_space import free_components, obstacles_at
-from expert.verify.start_set import StartSet
+from expert.problems.grasp import GraspProblem, GraspSolution, arrangement_at
+from expert.verify.grasp.finger_path import FingerPath
+from expert.verify.grasp.start_set import StartSet
+from expert.world.named import named_shape
+from expert.world.shape import Shape
+from expert.world.slices import free_components, obstacles_at
 
+PROBLEMS = Path("configs/problem/certified_grasp")
+"""The random polygons of Fig. 5-28, from the folder in which the command runs."""
 RANDOM, NAMED, METHODS = 12, ("T", "hourglass", "M", "I"), ("miqp1", "miqp2", "goal_cell")
 RUNS, COMPARED = 60, 100
 TIME_LIMIT = 300.0
@@ -65,7 +69,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def random_polygons() -> tuple[Figure, dict[str, Any]]:
     """Fig. 5-28: twelve seeded random polygons, each grasped from random starts."""
-    objects = {f"polygon {k}": irregular_polygon(np.random.default_rng(k), 4 + k % 3) for k in range(RANDOM)}
+    objects = {
+        f"polygon {k}": read_problem(PROBLEMS / f"random_{k:02d}.yaml").task.shape.vertices
+        for k in range(RANDOM)
+    }
     figure, rows = new_figure(11, 8.4), []
     panels = figure.subplots(3, 4).ravel()
     for axes, (name, vertices) in zip(panels, _watched(objects.items(), "5-28"), strict=True):
@@ -91,7 +98,7 @@ def overlays() -> tuple[Figure, dict[str, Any]]:
     figure, rows = new_figure(10, 8.2), []
     grid = figure.subplots(len(NAMED), 5)
     for line, name in zip(grid, _watched(NAMED, "5-29"), strict=True):
-        task, answer = _solved(grasp_shape(name), "goal_cell")
+        task, answer = _solved(named_shape(name), "goal_cell")
         rows.append({"object": name, "status": answer.status, "seconds": answer.seconds})
         if _unsolved(line[0], name, answer):
             for axes in line:
@@ -114,7 +121,7 @@ def attraction() -> tuple[Figure, dict[str, Any]]:
     grid = figure.subplots(len(names), len(METHODS))
     cases = [(i, j, name, method) for i, name in enumerate(names) for j, method in enumerate(METHODS)]
     for i, j, name, method in _watched(cases, "5-30"):
-        task, answer = _solved(grasp_shape(name), method)
+        task, answer = _solved(named_shape(name), method)
         rows.append({"object": name, "method": method, "status": answer.status, "seconds": answer.seconds})
         if len(answer.path) == 0:
             _unsolved(grid[i, j], f"{name}, {method}", answer)
@@ -137,10 +144,10 @@ def draw_start_set(axes: Axes, task: GraspProblem, answer: GraspSolution) -> Non
     """The object at its goal, fingers at the start, and in blue where its reference point may be, at true scale."""
     first = arrangement_at(task, answer, 0.0)
     angle, here = float(task.pose[2]), shapely.Point(task.pose[:2])
-    for obstacle in obstacles_at(first, angle):
+    for obstacle in obstacles_at(first.shape, first.fingers, first.walls, angle):
         axes.plot(*np.array(obstacle.exterior.coords).T, color=EDGE, lw=0.4, alpha=0.5)
     axes.plot(*_closed(to_world(task.pose, task.shape.vertices)).T, color=GOAL, lw=1.2)
-    for part in free_components(first, angle):
+    for part in free_components(first.shape, first.fingers, first.walls, angle):
         if part.distance(here) < 1e-6 * task.shape.size:
             axes.fill(*np.array(part.exterior.coords).T, color=PATH, lw=0.8, zorder=3)
     for finger in np.swapaxes(answer.path, 0, 1):
@@ -152,7 +159,7 @@ def draw_start_set(axes: Axes, task: GraspProblem, answer: GraspSolution) -> Non
 
 def against_force_closure() -> tuple[Figure, dict[str, Any]]:
     """Fig. 5-31: the same starts, grasped with a certificate and by contacts chosen for their quality."""
-    task, answer = _solved(grasp_shape(NAMED[0]), "goal_cell")
+    task, answer = _solved(named_shape(NAMED[0]), "goal_cell")
     figure = new_figure(10, 5.2)
     left, middle, right = figure.subfigures(1, 3, squeeze=False, width_ratios=(1, 1, 1.2))[0]
     noise = left.subplots()

@@ -4,11 +4,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from expert.caging.problem import Arrangement, CageProblem, Gripper, HalfRanges, Shape
-from expert.caging.solution import CageSolution, CageStatus, Meeting
 from expert.errors import InvalidProblem
 from expert.files.fields import SMALLEST, Section, checked_array, shorten
 from expert.geometry.pose import Array
+from expert.problems.cage import Arrangement, CageProblem, CageSolution, CageStatus, HalfRanges, Meeting
+from expert.world.fingers import Gripper
+from expert.world.shape import Shape
 
 if TYPE_CHECKING:
     from expert.files import Problem
@@ -74,7 +75,7 @@ def _read_shape(section: Section) -> Shape:
     for k, piece in enumerate(pieces):
         require_size(f"{section.path('pieces')}[{k}]", piece)
     if "vertices" in section:
-        return Shape(vertices=section.array("vertices", (None, 2)), pieces=pieces)
+        return Shape(vertices=section.array("vertices", (None, 2)), given_pieces=pieces)
     return Shape.of_pieces(pieces)
 
 
@@ -151,7 +152,7 @@ def answer_fields(problem: "Problem", answer: CageSolution) -> dict[str, Any]:
 
 
 def read_answer(problem: "Problem", data: dict[str, Any]) -> CageSolution:
-    """The answer of a solution file, checked for form (its truth is what `expert.verify.cage` checks)."""
+    """The answer of a solution file, checked for form (its truth is what `expert.verify.cage.check` checks)."""
     keys = ("status", "fingers", "rotation_range", "topology", "objective", "seconds", "attempts")
     file = Section(data, "", (*keys, "refuted", "unconfirmed", "reason"))
     status: Any = file.choice("status", STATUSES)

@@ -12,7 +12,8 @@ from expert.files.cage import read_flag, read_grippers, require_size
 from expert.files.fields import Section, checked_array, shorten
 from expert.geometry.polygon import signed_area
 from expert.geometry.pose import Array
-from expert.grasping.problem import GraspProblem, GraspSolution, GraspStatus, Shape
+from expert.problems.grasp import GraspProblem, GraspSolution, GraspStatus
+from expert.world.shape import Shape
 
 if TYPE_CHECKING:
     from expert.files import Problem
@@ -89,7 +90,7 @@ def answer_fields(problem: "Problem", answer: GraspSolution) -> dict[str, Any]:
 
 
 def read_answer(problem: "Problem", data: dict[str, Any]) -> GraspSolution:
-    """The answer of a solution file, checked for form (its truth is what `expert.verify.grasp` checks)."""
+    """The answer of a solution file, checked for form (its truth is what `expert.verify.grasp.check` checks)."""
     keys = ("status", "method", "path", "facets", "starts", "objective", "seconds", "refuted", "reason")
     file = Section(data, "", keys)
     task: GraspProblem = problem.task

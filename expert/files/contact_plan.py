@@ -11,7 +11,8 @@ from expert.errors import InvalidProblem
 from expert.files.fields import Section, shorten
 from expert.geometry.polygon import signed_area
 from expert.geometry.pose import to_world
-from expert.types import FREE, SUPPORT, ContactForce, ContactTask, IntArray, Plan, Status
+from expert.problems.contact import FREE, SUPPORT, ContactForce, ContactTask, Plan, Status
+from expert.world.values import IntArray
 
 if TYPE_CHECKING:
     from expert.files import Problem

@@ -2,7 +2,8 @@
 
 from typing import Any
 
-from expert.types import ContactTask, HalfPlane
+from expert.problems.contact import ContactTask
+from expert.world.walls import HalfPlane
 
 
 def task_fields(task: ContactTask, *, description: str = "") -> dict[str, Any]:

@@ -14,16 +14,12 @@ from expert.files.contact_plan import answer_fields, read_answer
 from expert.files.fields import SMALLEST, Section, shorten
 from expert.geometry.polygon import mass_properties, simple_polygon
 from expert.geometry.pose import Array, to_world
-from expert.types import (
-    Body,
-    ContactTask,
-    Cost,
-    Environment,
-    Fingers,
-    HalfPlane,
-    Robustness,
-    Trajectory,
-)
+from expert.problems.contact import ContactTask, Cost, Robustness
+from expert.world.environment import Environment
+from expert.world.fingers import Fingers
+from expert.world.motion import Trajectory
+from expert.world.shape import Body
+from expert.world.walls import HalfPlane
 
 __all__ = ["answer_fields", "read", "read_answer"]
 

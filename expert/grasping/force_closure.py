@@ -10,9 +10,9 @@ import numpy as np
 import shapely
 from numba import njit
 
-from expert.caging.problem import Shape
 from expert.geometry.polygon import facet_frames, facets, mass_properties
 from expert.geometry.pose import Array, to_body, to_world
+from expert.world.shape import Shape
 
 INSET, SPACING = 0.1, 0.06
 """Contacts keep this share of a facet from its ends, and are tried this far apart, over the object's diameter."""

@@ -4,12 +4,12 @@ import itertools
 
 import numpy as np
 
-from expert.caging.frame import Frame
-from expert.caging.problem import Gripper
 from expert.caging.requirements import DIRECTIONS
 from expert.geometry.pose import Array, rotation
-from expert.grasping.problem import GraspProblem
 from expert.grasping.rows import Rows
+from expert.problems.grasp import GraspProblem
+from expert.world.fingers import Gripper
+from expert.world.frame import Frame
 
 Places = tuple[int, ...]
 """places[f] is the place of finger f in the order of the cell; places without a gripper are given in increasing order."""

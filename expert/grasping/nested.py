@@ -18,7 +18,6 @@ from functools import cached_property
 import numpy as np
 
 from expert.caging.model import join_pieces, triangles, wind_once
-from expert.caging.swept import SweptGeometry, cleaned, swept_inside
 from expert.geometry.convex import Region
 from expert.geometry.cover import clip, half_planes
 from expert.geometry.polygon import signed_area
@@ -28,8 +27,9 @@ from expert.grasping.facets import Facets, rays
 from expert.grasping.goal_cell import DIRECTIONS, MIN_WEIGHT, REACH, SUM_WEIGHT
 from expert.grasping.rows import Rows
 from expert.grasping.smooth import SPEED
+from expert.loops.swept import SweptGeometry, cleaned, swept_inside
 from expert.mip.linear import LinearModel, Term
-from expert.types import IntArray
+from expert.world.values import IntArray
 
 HalfPlanes = tuple[Array, Array]
 WIDEST = np.radians(4)

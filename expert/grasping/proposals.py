@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from expert.caging.frame import Frame
 from expert.errors import InvalidProblem, SolverFailed
 from expert.geometry.polygon import signed_area
 from expert.geometry.pose import Array
@@ -28,9 +27,10 @@ from expert.grasping.goal_cell import (
 )
 from expert.grasping.gripper import Places, jaws, placements
 from expert.grasping.nested import FacetGeometry, Grasp, schedule
-from expert.grasping.problem import GraspProblem
 from expert.grasping.smooth import acceleration, smoothest
 from expert.grasping.thesis import Name, solutions
+from expert.problems.grasp import GraspProblem
+from expert.world.frame import Frame
 
 ENLARGED = 10
 """So many goal cells, the best by 5-CT16, have the area of their start maximised."""

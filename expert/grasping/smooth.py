@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from expert.contact.qp import INFEASIBLE, SOLVED, solve_qp
 from expert.errors import SolverFailed
 from expert.geometry.pose import Array
 from expert.grasping.rows import Rows
+from expert.numeric.qp import INFEASIBLE, SOLVED, solve_qp
 
 SPEED = 1e-3
 """Weight of squared steps: among equally smooth paths the shorter one."""

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from expert.grasping.least_norm import least_norm
+from expert.numeric.least_norm import least_norm
 
 REACH = 4e-3
 """Facets this near to a finger take part in a step; no step moves object and finger nearer by more."""

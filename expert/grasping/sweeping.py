@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expert.caging.problem import Shape
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import facet_frames, facets, mass_properties, reflex_vertices
 from expert.geometry.pose import Array, rotation
 from expert.grasping.sweep_kernel import REACH, sweep_all
-from expert.types import readonly, require
+from expert.world.shape import Shape
+from expert.world.values import readonly, require
 
 STEP = 3e-4
 """Largest finger motion of a step, over the object's diameter."""

@@ -1,6 +1,6 @@
 """Find finger paths that grasp with certainty: a named method proposes, the independent checker decides.
 
-No proposal leaves as `certified` unless `expert.verify.grasp` has confirmed it.
+No proposal leaves as `certified` unless `expert.verify.grasp.check` has confirmed it.
 """
 
 import time
@@ -11,11 +11,11 @@ from typing import Literal
 
 from expert.errors import InvalidProblem
 from expert.geometry.pose import rotation
-from expert.grasping.problem import GraspProblem, GraspSolution
 from expert.grasping.proposals import Proposal, Search, decomposed, goal_cells, thesis
 from expert.grasping.smooth import acceleration
-from expert.verify.grasp import verify_grasp
-from expert.verify.grasp_report import GraspReport
+from expert.problems.grasp import GraspProblem, GraspSolution
+from expert.verify.grasp.check import verify_grasp
+from expert.verify.grasp.report import GraspReport
 
 Method = Literal["goal_cell", "decomposed", "miqp1", "miqp2"]
 MOST_CELLS, MOST_CHECKS = 8, 20

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from expert.geometry.pose import Array
 from expert.mip.backends import Answer, Solver, StandardForm, backend
-from expert.types import IntArray
+from expert.world.values import IntArray
 
 Term = tuple[ArrayLike, IntArray]
 """(coefficients, variables); axes beyond those of the constraint's right-hand side are summed over."""

@@ -15,12 +15,14 @@ from rich.table import Table
 
 from expert.files.certified_grasp import schedule
 from expert.geometry.pose import Array, to_world
-from expert.grasping.problem import GraspProblem, GraspSolution, Shape
-from expert.grasping.shapes import NAMES, grasp_shape, irregular_polygon
 from expert.grasping.sweeping import sweep
 from expert.grasping.synthesis import solve
-from expert.verify.grasp import verify_grasp
-from expert.verify.grasp_report import GraspReport
+from expert.problems.grasp import GraspProblem, GraspSolution
+from expert.verify.grasp.check import verify_grasp
+from expert.verify.grasp.report import GraspReport
+from expert.world.named import named_shape
+from expert.world.shape import Shape
+from tests.support.polygons import GRASPED, irregular_polygon
 
 QUIET = Console(stderr=True)
 TIME_LIMIT = 300.0
@@ -38,7 +40,7 @@ class Study:
         self.random = {
             f"polygon {k}": irregular_polygon(np.random.default_rng(k), 4 + k % 3) for k in numbers
         }
-        self.named = {name: grasp_shape(name) for name in (NAMES[:2] if quick else NAMES)}
+        self.named = {name: named_shape(name) for name in (GRASPED[:2] if quick else GRASPED)}
         self.found: dict[tuple[str, float], tuple[GraspProblem, GraspSolution]] = {}
         self.seconds: dict[tuple[str, float], float] = {}
 

@@ -27,12 +27,11 @@ from rich.table import Table
 
 from datasets.specification import Sample
 from datasets.store import read_dataset
-from dlm.checkpoint import load, restore_weights
 from dlm.evaluation.outcomes import Outcome, execute
 from dlm.execution import given_action, idle_where_unsolved, simulate
-from dlm.inverse_dynamics import Action, InverseDynamics
+from dlm.inverse_dynamics.layer import Action, InverseDynamics
+from dlm.inverse_dynamics.parameters import ParameterBatch
 from dlm.metrics import object_trajectory_loss
-from dlm.parameters import ParameterBatch
 from dlm.simulator import SimulatorSettings
 from dlm.structured import ClassPlanner, Planned, StructuredModel
 from dlm.structured.examples import Example
@@ -42,6 +41,7 @@ from dlm.structured.policies import Perceiver, StructuredArchitecture, joined, u
 from dlm.structured.scorer import Scorer
 from dlm.structured.weights import SHIPPED
 from dlm.tasks import TaskBatch
+from dlm.training.checkpoint import load, restore_weights
 from expert.errors import InvalidProblem
 from tests.benchmarks.structured import SEED, fresh, seen
 

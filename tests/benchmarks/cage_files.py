@@ -17,10 +17,10 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from expert.caging.problem import Arrangement, CageProblem
 from expert.caging.synthesis import solve
 from expert.files import read_problem
-from expert.verify.cage import verify
+from expert.problems.cage import Arrangement, CageProblem
+from expert.verify.cage.check import verify
 
 FOLDER = Path("configs/problem/cage")
 RESTRICTED_BAR = 10.0

@@ -19,12 +19,12 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from expert.caging.problem import Arrangement
 from expert.geometry.pose import Array, to_world
-from expert.verify.cage import CageReport, verify_cage
-from expert.verify.escape import escape_fault
-from expert.verify.refute import random_escape
-from tests.expert.caging.arrangements import random_arrangement, transformed, with_finger
+from expert.problems.cage import Arrangement
+from expert.verify.cage.check import CageReport, verify_cage
+from expert.verify.cage.escape import escape_fault
+from expert.verify.cage.refute import random_escape
+from tests.support.arrangements import random_arrangement, transformed, with_finger
 
 MEDIAN_BAR, P99_BAR = 0.020, 1.0
 

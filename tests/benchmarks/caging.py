@@ -20,12 +20,13 @@ from rich.progress import track
 from rich.table import Table
 
 from expert.caging.immobilise import candidates
-from expert.caging.problem import Arrangement, CageProblem, Shape
-from expert.caging.shapes import NAMES, named_shape, random_nonconvex_polygon, random_polygon
-from expert.caging.solution import CageSolution
 from expert.caging.synthesis import solve
 from expert.geometry.pose import Array, to_world
-from expert.verify.cage import verify_cage
+from expert.problems.cage import Arrangement, CageProblem, CageSolution
+from expert.verify.cage.check import verify_cage
+from expert.world.named import named_shape
+from expert.world.shape import Shape
+from tests.support.polygons import CAGED, random_nonconvex_polygon, random_polygon
 
 SHARE_BAR, MEDIAN_BAR, MAX_BAR, PAIR_BAR = 0.98, 0.5, 20.0, 0.5
 TIME_LIMIT, PAIR_LIMIT, THESIS_LIMIT = 40.0, 4.0, 15.0
@@ -127,7 +128,7 @@ def _cases(options: argparse.Namespace) -> list[tuple[str, list[Array], int, str
     number, limit = (12, 8.0) if options.quick else (options.polygons, TIME_LIMIT)
     polygons = [random_polygon(np.random.default_rng(k), 4 + k % 7) for k in range(number)]
     pocketed = [random_nonconvex_polygon(np.random.default_rng(k), 5 + k % 6) for k in range(min(number, 20))]
-    named = [named_shape(name) for name in NAMES]
+    named = [named_shape(name) for name in CAGED]
     method, pair_limit = options.method, PAIR_LIMIT / 2 if options.quick else PAIR_LIMIT
     cases = [("random", polygons, n, method, limit) for n in (3, 4)]
     cases += [("non-convex", pocketed, 2, method, pair_limit)]

@@ -27,9 +27,9 @@ from datasets.shapes import Shapes
 from expert.contact import solve
 from expert.contact.exact import warm_up
 from expert.files import read_problem
-from expert.types import ContactTask, Plan, Robustness
-from expert.verify.plan import check_plan
-from tests.expert.contact.random_tasks import floor_task, table_task
+from expert.problems.contact import ContactTask, Plan, Robustness
+from expert.verify.plan.check import check_plan
+from tests.support.random_tasks import floor_task, table_task
 
 GALLERY = Path(__file__).parents[2] / "configs" / "problem" / "contact_trajectory"
 PRIMITIVES = (

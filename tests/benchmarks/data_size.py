@@ -18,14 +18,14 @@ import torch
 from rich.console import Console
 from rich.table import Table
 
-from dlm.checkpoint import read_about
 from dlm.evaluation.outcomes import Outcome, act, execute
 from dlm.evaluation.settle import settle
 from dlm.execution import idle_action
-from dlm.models import Policy
+from dlm.policy import Policy
 from dlm.simulator import SimulatorSettings
 from dlm.structured.policies import ProposalPolicy
 from dlm.tasks import TaskBatch
+from dlm.training.checkpoint import read_about
 from evaluate import load_policy
 
 ROOT = Path(__file__).resolve().parents[2]

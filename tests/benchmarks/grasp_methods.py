@@ -20,11 +20,11 @@ from expert.drawing.grasp_figures import force_closure_comparison, start_area
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import mass_properties
 from expert.geometry.pose import Array
-from expert.grasping.problem import GraspProblem, GraspSolution
 from expert.grasping.sweeping import sweep
 from expert.grasping.synthesis import solve
-from expert.verify.finger_path import FingerPath
-from expert.verify.start_set import StartSet
+from expert.problems.grasp import GraspProblem, GraspSolution
+from expert.verify.grasp.finger_path import FingerPath
+from expert.verify.grasp.start_set import StartSet
 from tests.benchmarks._grasp_study import (
     TIME_LIMIT,
     Bars,

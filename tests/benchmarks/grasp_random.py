@@ -20,20 +20,21 @@ import numpy as np
 from scipy.optimize import linprog
 
 from expert.geometry.pose import Array
-from expert.grasping.problem import GraspProblem, Shape
 from expert.grasping.proposals import Search, thesis
-from expert.grasping.shapes import irregular_polygon
 from expert.grasping.sweeping import sweep
-from expert.verify.dead_ends import DeadEndEvent, dead_end_events
-from expert.verify.end_grasp import form_closure, gap_gradients, observability_rank, touching
-from expert.verify.event_kernel import TOUCH
-from expert.verify.finger_path import FingerPath
-from expert.verify.grasp import verify_grasp
-from expert.verify.grasp_report import GraspReport
-from expert.verify.start_set import StartSet
+from expert.problems.grasp import GraspProblem
+from expert.verify.grasp.check import verify_grasp
+from expert.verify.grasp.dead_ends import DeadEndEvent, dead_end_events
+from expert.verify.grasp.end_grasp import form_closure, gap_gradients, observability_rank, touching
+from expert.verify.grasp.event_kernel import TOUCH
+from expert.verify.grasp.finger_path import FingerPath
+from expert.verify.grasp.report import GraspReport
+from expert.verify.grasp.start_set import StartSet
+from expert.world.shape import Shape
 from tests.benchmarks._grasp_study import TIME_LIMIT, Bars, Part, Row, Study, arrivals, run, task, watched
-from tests.expert.grasping.experiments import closing_path, miss
-from tests.expert.verify.grasps import shrinking_case
+from tests.support.experiments import closing_path, miss
+from tests.support.grasps import shrinking_case
+from tests.support.polygons import irregular_polygon
 
 MATCH = 1e-3
 """Largest distance of a stall from its prediction: in s, in enclosing radii and in rad."""

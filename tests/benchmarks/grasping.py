@@ -15,10 +15,10 @@ import time
 import numpy as np
 
 from expert.geometry.polygon import mass_properties
-from expert.verify.finger_path import FingerPath
-from expert.verify.start_set import StartSet
+from expert.verify.grasp.finger_path import FingerPath
+from expert.verify.grasp.start_set import StartSet
 from tests.benchmarks._grasp_study import Bars, Part, Row, Study, arrivals, moved_report, run, watched
-from tests.expert.grasping.experiments import hard_starts
+from tests.support.experiments import hard_starts
 
 MEDIAN_BAR, MAX_BAR, DEAD_END_BAR, WIDE_BAR = 5.0, 30.0, 2.0, 10 / 12
 AREA_BARS = {"median": 0.01, "T": 0.025, "hourglass": 0.10}

@@ -22,12 +22,12 @@ from rich.table import Table
 
 from datasets.label import Label
 from datasets.parameters import parameters_of
-from dlm.inverse_dynamics import Action, InverseDynamics
-from dlm.parameters import ParameterBatch
-from dlm.qp_data import qp_data
-from expert.types import ContactTask
-from tests.datasets.labelled import labels
-from tests.dlm.test_inverse_dynamics import LAYOUT, misses, random_rows, score
+from dlm.inverse_dynamics.data import qp_data
+from dlm.inverse_dynamics.layer import Action, InverseDynamics
+from dlm.inverse_dynamics.parameters import ParameterBatch
+from expert.problems.contact import ContactTask
+from tests.dlm.inverse_dynamics.test_layer import LAYOUT, misses, random_rows, score
+from tests.support.labelled import labels
 
 BACKENDS = ("cvxpylayers", "batched")
 WITHIN = 1e-4

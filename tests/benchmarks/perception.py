@@ -32,8 +32,10 @@ from dlm.perception.raster import coverage
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, to_world
 from expert.mechanics import external_contacts
-from expert.types import Body, ContactTask, Trajectory
-from tests.dlm.perception.mujoco_video import mujoco_videos
+from expert.problems.contact import ContactTask
+from expert.world.motion import Trajectory
+from expert.world.shape import Body
+from tests.support.mujoco_video import mujoco_videos
 
 KINDS: dict[str, ShapeFamily] = {"4-6": Shapes(), "12": Shapes(facets=(12, 12)), "omnipush": OmniPush()}
 """Shapes by name."""

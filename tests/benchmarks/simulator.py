@@ -32,9 +32,9 @@ from dlm.simulator.rollout import Motion, advance, motion_for, start_motion
 from dlm.simulator.settings import Physics
 from dlm.simulator.step import Work, solve_step, work_for
 from expert.geometry.pose import Array
-from expert.types import Environment
-from tests.dlm.simulator.expert_plans import Planned, planned_tasks, transverse_tasks
-from tests.dlm.simulator.scenes import batch_of, push, random_case
+from expert.world.environment import Environment
+from tests.support.expert_plans import Planned, planned_tasks, transverse_tasks
+from tests.support.scenes import batch_of, push, random_case
 
 SEED = 20_261
 ROLLOUT_BAR, DIFFERENCE_BAR, IMPLICIT_BAR = 0.1, 5.0, 2.0

@@ -21,15 +21,15 @@ from rich.table import Table
 
 from datasets.render import Frames
 from datasets.specification import Sample
-from dlm.checkpoint import load, restore_weights
 from dlm.evaluation.significance import compare_all
 from dlm.execution import expert_action, idle_action
-from dlm.inverse_dynamics import Action
-from dlm.models import Kind, Policy
+from dlm.inverse_dynamics.layer import Action
+from dlm.policy import Kind, Policy
 from dlm.structured import ExpertPlanner, StructuredModel
 from dlm.structured.bias import STATED
 from dlm.structured.policies import Perceiver, StructuredArchitecture, unsolved
 from dlm.tasks import TaskBatch
+from dlm.training.checkpoint import load, restore_weights
 from expert.errors import InvalidProblem
 from tests.benchmarks.structured import SEED, Record, executed, fresh
 

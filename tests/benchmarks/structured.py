@@ -32,7 +32,7 @@ from datasets.specification import Sample, Specification
 from datasets.store import read_dataset
 from dlm.evaluation.outcomes import FALLEN
 from dlm.execution import expert_action, given_action, idle_action, idle_where_unsolved, simulate
-from dlm.inverse_dynamics import Action
+from dlm.inverse_dynamics.layer import Action
 from dlm.metrics import object_trajectory_loss, rotation_error, translation_error, within
 from dlm.simulator import SimulatorSettings
 from dlm.structured import ExpertPlanner, Planned, StructuredModel
@@ -41,7 +41,7 @@ from dlm.tasks import TaskBatch
 from expert.errors import InvalidProblem
 from expert.geometry.pose import to_body, to_world
 from expert.mechanics import external_contacts
-from expert.types import FREE, ContactTask, Plan
+from expert.problems.contact import FREE, ContactTask, Plan
 
 KINDS: dict[str, ShapeFamily] = {
     "4-6": Shapes(),

@@ -23,7 +23,7 @@ from datasets.specification import FailedDraw, Specification, draw, generator
 from datasets.store import encode_shard, read_dataset, read_manifest, shard_path
 from expert.contact import solve
 from expert.errors import InvalidProblem, SolverFailed
-from expert.verify.plan import check_plan
+from expert.verify.plan.check import check_plan
 
 Contents = Callable[[Path], dict[str, bytes]]
 

@@ -11,7 +11,8 @@ from datasets.shapes import Shapes
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, to_world
 from expert.mechanics import external_contacts
-from expert.types import Body, ContactTask
+from expert.problems.contact import ContactTask
+from expert.world.shape import Body
 
 KINDS = [Shapes(), Shapes(facets=(12, 12))]
 seeds = st.integers(0, 2**32)

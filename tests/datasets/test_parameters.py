@@ -15,8 +15,8 @@ from datasets.parameters import (
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import signed_distance
 from expert.geometry.pose import cross, to_body
-from expert.types import FREE, Cost, Plan
-from tests.datasets.labelled import labels
+from expert.problems.contact import FREE, Cost, Plan
+from tests.support.labelled import labels
 
 
 @pytest.fixture(params=range(12))

@@ -6,7 +6,7 @@ import pytest
 
 from expert.contact import solve
 from expert.files import read_problem
-from expert.verify.plan import verify
+from expert.verify.plan.check import verify
 
 PROBLEMS = sorted(Path("configs/problem/contact_trajectory").glob("*.yaml"))
 UNPROVED = "tool_pivot_one_finger"

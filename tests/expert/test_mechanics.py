@@ -15,8 +15,10 @@ from expert.mechanics import (
     required_wrench,
     wrench_about,
 )
-from expert.types import SUPPORT, ContactTask, HalfPlane, Robustness, Trajectory
-from tests.expert.hand_plans import (
+from expert.problems.contact import SUPPORT, ContactTask, Robustness
+from expert.world.motion import Trajectory
+from expert.world.walls import HalfPlane
+from tests.support.hand_plans import (
     FLOOR_FRICTION,
     SQUARE,
     SUPPORT_FRICTION,

@@ -1,14 +1,16 @@
 import torch
 from torch import nn
 
-from dlm.derender import NetworkSizes
 from dlm.evaluation.settle import settle
-from dlm.inverse_dynamics import InverseDynamics
-from dlm.losses import ActionLoss
-from dlm.models import Policy, ThesisModel
-from dlm.parameters import Layout
+from dlm.inverse_dynamics.layer import InverseDynamics
+from dlm.inverse_dynamics.parameters import Layout
+from dlm.policy import Policy
 from dlm.tasks import TaskBatch
-from dlm.training import Schedule, Training
+from dlm.thesis.derender import NetworkSizes
+from dlm.thesis.losses import ActionLoss
+from dlm.thesis.policies import ThesisModel
+from dlm.training.loop import Training
+from dlm.training.stage import Schedule
 
 SMALL = NetworkSizes(channels=(2, 3, 4), latent=8, recurrent_layers=1, hidden_layers=1, dropout=0.5)
 

@@ -17,8 +17,8 @@ from dlm.tasks import TaskBatch
 from expert.errors import InvalidProblem
 from expert.files import read_solution
 from expert.files.document import save
-from expert.verify.plan import check_plan
-from tests.dlm.infer.clips import CAMERA, SCALE, SIZE, drawn, write_clip
+from expert.verify.plan.check import check_plan
+from tests.support.clips import CAMERA, SCALE, SIZE, drawn, write_clip
 
 KNOWN = Scene(scale=SCALE)
 

@@ -9,17 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dlm.derender import NetworkSizes
 from dlm.infer.__main__ import main
-from dlm.inverse_dynamics import InverseDynamics
-from dlm.losses import ParameterLoss
-from dlm.models import ThesisModel
-from dlm.parameters import Layout
+from dlm.inverse_dynamics.layer import InverseDynamics
+from dlm.inverse_dynamics.parameters import Layout
 from dlm.simulator.__main__ import main as simulate
 from dlm.tasks import TaskBatch
-from dlm.training import Schedule, Stage, Training
+from dlm.thesis.derender import NetworkSizes
+from dlm.thesis.losses import ParameterLoss
+from dlm.thesis.policies import ThesisModel
+from dlm.training.loop import Training
+from dlm.training.stage import Schedule, Stage
 from expert.__main__ import main as expert
-from tests.dlm.infer.clips import drawn, write_clip
+from tests.support.clips import drawn, write_clip
 
 
 @pytest.fixture(scope="module")

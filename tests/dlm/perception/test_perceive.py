@@ -19,8 +19,10 @@ from expert.errors import InvalidProblem
 from expert.geometry.polygon import mass_properties, signed_area, simple_polygon
 from expert.geometry.pose import Array, to_world
 from expert.mechanics import external_contacts
-from expert.types import Body, ContactTask, Trajectory
-from tests.dlm.perception.mujoco_video import mujoco_videos
+from expert.problems.contact import ContactTask
+from expert.world.motion import Trajectory
+from expert.world.shape import Body
+from tests.support.mujoco_video import mujoco_videos
 
 LEANING = np.array([[-0.03, -0.02], [0.03, -0.02], [0.04, 0.01], [-0.01, 0.035]])
 LEANING = LEANING - mass_properties(LEANING).centroid

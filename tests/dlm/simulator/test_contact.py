@@ -9,8 +9,8 @@ from datasets.shapes import Shapes, sample_polygon
 from dlm.simulator import SceneBatch, SimulatorSettings
 from dlm.simulator.contact import CONTACT, FACET, WALL, activation, collect, nearest, view
 from expert.geometry.polygon import signed_distance
-from expert.types import Body
-from tests.dlm.simulator.scenes import T, scene
+from expert.world.shape import Body
+from tests.support.scenes import T, scene
 
 U_SHAPE = np.array([[0, 0], [6, 0], [6, 4], [4, 4], [4, 2], [2, 2], [2, 4], [0, 4]]) * 0.01
 REST = np.zeros(3)

@@ -9,7 +9,7 @@ from dlm.simulator.execution import command, desired_motion, plan_commands, pull
 from dlm.simulator.replay import planned_commands
 from expert.errors import InvalidProblem
 from expert.geometry.pose import rotation, to_world
-from tests.dlm.simulator.scenes import MASS, WEIGHT, T, lift, push, random_case, scene
+from tests.support.scenes import MASS, WEIGHT, T, lift, push, random_case, scene
 
 STIFFNESS = 1e5 * MASS
 

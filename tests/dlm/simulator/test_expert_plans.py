@@ -8,7 +8,7 @@ from dlm.metrics import object_trajectory_loss, within
 from dlm.simulator import Execution, SceneBatch, SimulatorSettings, rollout
 from dlm.simulator.mujoco import replay_in_mujoco
 from tests.benchmarks.simulator import descend
-from tests.dlm.simulator.expert_plans import planned_tasks, transverse_tasks
+from tests.support.expert_plans import planned_tasks, transverse_tasks
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from dlm.simulator import Execution, SceneBatch, SimulatorSettings, replay, rollout
-from tests.dlm.simulator.scenes import MASS, T, batch_of, lift, push, random_case, transverse_push
+from tests.support.scenes import MASS, T, batch_of, lift, push, random_case, transverse_push
 
 STIFFNESS = 1e5 * MASS
 """Forces over stiffness are lengths, like positions."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dlm.simulator import SimulatorSettings, replay
-from tests.dlm.simulator.scenes import lift, push, transverse_push
+from tests.support.scenes import lift, push, transverse_push
 
 mujoco = pytest.importorskip("mujoco")
 from dlm.simulator.mujoco import MujocoMissing, export_plan, plan_model, replay_in_mujoco, replay_model  # noqa: E402

@@ -7,8 +7,10 @@ import pytest
 
 from dlm.simulator import Scene, SceneBatch, SimulatorSettings, replay
 from dlm.simulator.replay import simulate
-from expert.types import Environment, HalfPlane, Trajectory
-from tests.dlm.simulator.scenes import DT, MASS, WEIGHT, G, T, block, lift, push, random_case, scene
+from expert.world.environment import Environment
+from expert.world.motion import Trajectory
+from expert.world.walls import HalfPlane
+from tests.support.scenes import DT, MASS, WEIGHT, G, T, block, lift, push, random_case, scene
 
 STEPS, SUBSTEPS = 40, 20
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from dlm.simulator import Scene, SceneBatch, SimulatorSettings, replay, rollout, rollout_with_status
 from expert.errors import InvalidProblem
 from expert.geometry.pose import to_world
-from expert.types import Body
-from tests.dlm.simulator.scenes import DT, T, batch_of, lift, push, random_case, scene
+from expert.world.shape import Body
+from tests.support.scenes import DT, T, batch_of, lift, push, random_case, scene
 
 
 def test_a_batch_equals_its_single_runs_bit_for_bit():

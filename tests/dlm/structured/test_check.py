@@ -6,16 +6,16 @@ import torch
 
 from datasets.parameters import parameters_of
 from datasets.specification import Sample
-from dlm.inverse_dynamics import InverseDynamics
-from dlm.parameters import ParameterBatch
+from dlm.inverse_dynamics.layer import InverseDynamics
+from dlm.inverse_dynamics.parameters import ParameterBatch
 from dlm.structured.check import check
 from dlm.structured.classes import Schedules
 from dlm.structured.examples import Example
 from dlm.structured.losses import MOST_REGRET, regrets
 from dlm.structured.planners import ClassPlanner, ExpertPlanner
 from dlm.tasks import TaskBatch
-from expert.types import FREE, ContactTask
-from expert.verify.plan import check_plan
+from expert.problems.contact import FREE, ContactTask
+from expert.verify.plan.check import check_plan
 
 SCHEDULES = Schedules()
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from dlm.structured.classes import MEASURED, Schedules, shares
 from expert.errors import InvalidProblem
-from expert.types import FREE
+from expert.problems.contact import FREE
 
 SCHEDULES = Schedules()
 

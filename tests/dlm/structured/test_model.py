@@ -16,7 +16,7 @@ from dlm.structured.trial import Trial
 from dlm.tasks import TaskBatch
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, to_world
-from expert.types import ContactTask, Plan
+from expert.problems.contact import ContactTask, Plan
 
 
 def seen_by_label(tasks: TaskBatch, k: int) -> Perceived:

@@ -6,9 +6,7 @@ import pytest
 import torch
 from matplotlib.figure import Figure
 
-from dlm.checkpoint import load
-from dlm.losses import ActionLoss, Loss, ParameterLoss, SimulationLoss
-from dlm.models import Kind
+from dlm.policy import Kind, Loss
 from dlm.simulator import SimulatorSettings
 from dlm.structured.bias import STATED
 from dlm.structured.examples import Example
@@ -17,7 +15,10 @@ from dlm.structured.policies import StructuredArchitecture
 from dlm.structured.scorer import stack
 from dlm.structured.weights import SHIPPED, strip, trained_model
 from dlm.tasks import TaskBatch
-from dlm.training import Row, Schedule, Stage, Training, Watch, fit
+from dlm.thesis.losses import ActionLoss, ParameterLoss, SimulationLoss
+from dlm.training.checkpoint import load
+from dlm.training.loop import Row, Training, Watch, fit
+from dlm.training.stage import Schedule, Stage
 from expert.errors import InvalidProblem
 
 SMALL = StructuredArchitecture(width=16, layers=1, heads=2)

@@ -12,13 +12,13 @@ from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 
 from expert.__main__ import main
-from expert.caging.problem import Arrangement, CageProblem
-from expert.caging.shapes import random_nonconvex_polygon, random_polygon
 from expert.errors import InvalidProblem
 from expert.files import problem_of
 from expert.geometry.convex import convex_pieces
 from expert.geometry.polygon import signed_distance
 from expert.geometry.pose import Array, to_world
+from expert.problems.cage import Arrangement, CageProblem
+from tests.support.polygons import random_nonconvex_polygon, random_polygon
 
 several = settings(
     max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None, derandomize=True

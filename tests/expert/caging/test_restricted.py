@@ -9,17 +9,18 @@ import shapely
 
 from expert.caging.closures import Closures, directions
 from expert.caging.polish import improvements
-from expert.caging.problem import CageProblem, Gripper, Shape
 from expert.caging.requirements import TRIPOD, objective
-from expert.caging.shapes import named_shape
-from expert.caging.solution import CageSolution
 from expert.caging.synthesis import solve
 from expert.errors import InvalidProblem
 from expert.files import read_problem
 from expert.geometry.polygon import signed_distance
 from expert.geometry.pose import cross, rotation, to_world
-from expert.verify.cage import verify, verify_cage
-from expert.verify.cage_claims import unmet_claim
+from expert.problems.cage import CageProblem, CageSolution
+from expert.verify.cage.check import verify, verify_cage
+from expert.verify.cage.claims import unmet_claim
+from expert.world.fingers import Gripper
+from expert.world.named import named_shape
+from expert.world.shape import Shape
 
 PROBLEMS = Path("configs/problem/cage")
 RESTRICTED = [f"{shape}_{kind}" for shape in ("t", "i", "m", "hourglass") for kind in ("wall", "grippers")]

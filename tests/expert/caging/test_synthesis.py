@@ -4,19 +4,21 @@ import numpy as np
 import pytest
 import shapely
 
-from expert.caging.frame import Frame
 from expert.caging.immobilise import candidates
 from expert.caging.model import triangles
-from expert.caging.problem import CageProblem, Gripper, Shape
-from expert.caging.shapes import named_shape, random_nonconvex_polygon, random_polygon
-from expert.caging.solution import CageSolution
-from expert.caging.swept import SweptGeometry, swept_steps
 from expert.caging.synthesis import solve
 from expert.errors import InvalidProblem
 from expert.geometry.cover import clip
 from expert.geometry.polygon import signed_distance
 from expert.geometry.pose import Array, rotation
-from expert.verify.cage import verify, verify_cage
+from expert.loops.swept import SweptGeometry, swept_steps
+from expert.problems.cage import CageProblem, CageSolution
+from expert.verify.cage.check import verify, verify_cage
+from expert.world.fingers import Gripper
+from expert.world.frame import Frame
+from expert.world.named import named_shape
+from expert.world.shape import Shape
+from tests.support.polygons import random_nonconvex_polygon, random_polygon
 
 
 def problem(vertices: Array, count: int, **changes: object) -> CageProblem:

@@ -6,17 +6,20 @@ import numpy as np
 import pytest
 
 from expert.caging import synthesis
-from expert.caging.frame import Frame
 from expert.caging.model import Proposal
-from expert.caging.problem import CageProblem, Gripper, Shape
-from expert.caging.shapes import named_shape, random_polygon
 from expert.caging.synthesis import solve
 from expert.caging.tally import Tally
 from expert.caging.thesis import ThesisModel, slices
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
 from expert.mip.backends import Solver
-from expert.verify.cage import verify
+from expert.problems.cage import CageProblem
+from expert.verify.cage.check import verify
+from expert.world.fingers import Gripper
+from expert.world.frame import Frame
+from expert.world.named import named_shape
+from expert.world.shape import Shape
+from tests.support.polygons import random_polygon
 
 NARROW = ((np.radians(40), np.radians(40)),)
 SMALL = ((np.radians(20), np.radians(20)),)

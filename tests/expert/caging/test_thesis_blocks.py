@@ -6,9 +6,6 @@ import pytest
 import shapely
 
 from expert.caging import thesis_blocks as blocks
-from expert.caging.frame import Frame
-from expert.caging.problem import Shape
-from expert.caging.shapes import named_shape, random_nonconvex_polygon, random_polygon
 from expert.caging.thesis import blocks as all_blocks
 from expert.caging.thesis import slices
 from expert.caging.thesis_blocks import Variables
@@ -18,6 +15,10 @@ from expert.geometry.polygon import facet_frames, reflex_vertices, signed_distan
 from expert.geometry.pose import Array, rotation
 from expert.mip.block import Block
 from expert.mip.solve import solve
+from expert.world.frame import Frame
+from expert.world.named import named_shape
+from expert.world.shape import Shape
+from tests.support.polygons import random_nonconvex_polygon, random_polygon
 
 HALF = np.radians(20)
 CLEARANCE = 1e-3

@@ -15,10 +15,10 @@ from expert.contact.thesis_blocks import Variables
 from expert.errors import SolverFailed
 from expert.files import read_problem
 from expert.mip.backends import Answer
-from expert.types import FREE, ContactTask, Robustness
-from expert.verify.plan import check_plan
-from tests.expert.contact.exact_points import assign
-from tests.expert.contact.random_tasks import floor_task, table_task
+from expert.problems.contact import FREE, ContactTask, Robustness
+from expert.verify.plan.check import check_plan
+from tests.support.exact_points import assign
+from tests.support.random_tasks import floor_task, table_task
 
 DATA = Path(__file__).parents[2] / "data" / "contact"
 GAP = 1e-3

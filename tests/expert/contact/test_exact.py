@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from expert.contact import exact, model, qp, solve
+from expert.contact import exact, model, solve
 from expert.contact.exact import warm_up
 from expert.contact.model import Model, model_of
 from expert.contact.plan_at import forces_at
@@ -15,19 +15,15 @@ from expert.contact.search import Search
 from expert.contact.sequence import sequence_of
 from expert.errors import InvalidProblem, SolverFailed
 from expert.geometry.pose import Array, rotation
-from expert.types import (
-    FREE,
-    Body,
-    ContactTask,
-    Environment,
-    Fingers,
-    HalfPlane,
-    Plan,
-    Robustness,
-    Trajectory,
-)
-from expert.verify.plan import check_plan
-from tests.expert.contact.random_tasks import floor_task, table_task
+from expert.numeric import qp
+from expert.problems.contact import FREE, ContactTask, Plan, Robustness
+from expert.verify.plan.check import check_plan
+from expert.world.environment import Environment
+from expert.world.fingers import Fingers
+from expert.world.motion import Trajectory
+from expert.world.shape import Body
+from expert.world.walls import HalfPlane
+from tests.support.random_tasks import floor_task, table_task
 
 ROBUST = Robustness(
     cone_fraction=0.7, support_inset=0.3, min_normal_force=0.04, min_interval=2, free_clearance=0.005

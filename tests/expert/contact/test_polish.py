@@ -10,8 +10,8 @@ from expert.contact import solve
 from expert.geometry.convex import Region, free_regions
 from expert.geometry.pose import Array, cross, rotation
 from expert.mechanics import external_contacts, friction_rays, required_wrench, wrench_about
-from expert.types import FREE, ContactTask, Plan, Robustness
-from tests.expert.contact.random_tasks import floor_task, table_task
+from expert.problems.contact import FREE, ContactTask, Plan, Robustness
+from tests.support.random_tasks import floor_task, table_task
 
 ROBUST = Robustness(
     cone_fraction=0.7, support_inset=0.3, min_normal_force=0.04, min_interval=2, free_clearance=0.005

@@ -7,8 +7,8 @@ import pytest
 
 from expert.contact import solve
 from expert.files import read_problem
-from expert.types import ContactTask
-from expert.verify.plan import check_plan
+from expert.problems.contact import ContactTask
+from expert.verify.plan.check import check_plan
 
 DATA = Path(__file__).parents[2] / "data" / "contact"
 REFERENCE = json.loads((DATA / "reference.json").read_text())

@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from expert.contact.model import Model, model_of
-from expert.contact.qp import INFEASIBLE, SOLVED
 from expert.contact.steps import cost_bound, gain, reach, shortfall, solve_step, tighten
 from expert.geometry.pose import cross
-from expert.types import Robustness
-from tests.expert.contact.random_tasks import floor_task, table_task
+from expert.numeric.qp import INFEASIBLE, SOLVED
+from expert.problems.contact import Robustness
+from tests.support.random_tasks import floor_task, table_task
 
 MODELS: list[Model] = [
     model_of(floor_task(np.random.default_rng(1))),

@@ -11,9 +11,9 @@ from expert.contact import thesis
 from expert.errors import SolverFailed
 from expert.files import read_problem
 from expert.mip.solve import Result
-from expert.types import ContactTask, Plan, Robustness
-from expert.verify.plan import check_plan
-from tests.expert.contact.random_tasks import floor_task, table_task
+from expert.problems.contact import ContactTask, Plan, Robustness
+from expert.verify.plan.check import check_plan
+from tests.support.random_tasks import floor_task, table_task
 
 DATA = Path(__file__).parents[2] / "data" / "contact"
 GAP = 1e-3

@@ -14,9 +14,9 @@ from expert.contact.thesis import cost
 from expert.contact.thesis_blocks import Variables
 from expert.mip.block import Block
 from expert.mip.solve import solve
-from expert.types import ContactTask, Robustness
-from tests.expert.contact.exact_points import assign, assign_cells
-from tests.expert.contact.random_tasks import floor_task, table_task
+from expert.problems.contact import ContactTask, Robustness
+from tests.support.exact_points import assign, assign_cells
+from tests.support.random_tasks import floor_task, table_task
 
 SEGMENTS = 4
 ROBUST = Robustness(

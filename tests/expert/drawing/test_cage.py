@@ -9,15 +9,17 @@ import shapely
 from PIL import Image
 
 from expert.__main__ import main
-from expert.caging.problem import Arrangement, CageProblem, Shape
-from expert.caging.shapes import named_shape, random_polygon
 from expert.caging.synthesis import solve
 from expert.drawing.cage import draw
 from expert.drawing.cage_component import linked_slices
 from expert.drawing.cage_slice import enclosing_loop
 from expert.errors import InvalidProblem
 from expert.files import read_problem
-from expert.verify.free_space import obstacles_at
+from expert.problems.cage import Arrangement, CageProblem
+from expert.world.named import named_shape
+from expert.world.shape import Shape
+from expert.world.slices import obstacles_at
+from tests.support.polygons import random_polygon
 
 PROBLEMS = Path("configs/problem/cage")
 
@@ -88,7 +90,9 @@ def test_the_drawn_loop_stays_in_obstacles_and_winds_once_around_the_start() -> 
     assert answer.found
     arrangement = task.arrangement(answer.fingers)
     loop = enclosing_loop(arrangement, answer)
-    forbidden = shapely.union_all(obstacles_at(arrangement, 0.5)).buffer(1e-9)
+    forbidden = shapely.union_all(
+        obstacles_at(arrangement.shape, arrangement.fingers, arrangement.walls, 0.5)
+    ).buffer(1e-9)
     assert forbidden.covers(shapely.LineString(loop))
     angles = np.unwrap(np.arctan2(*(loop - arrangement.pose[:2]).T[::-1]))
     assert abs(angles[-1] - angles[0]) == pytest.approx(2 * np.pi)

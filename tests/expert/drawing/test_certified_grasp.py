@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from expert.caging.problem import Shape
 from expert.drawing.certified_grasp import draw, executions, grasp_figure
 from expert.drawing.grasp_figures import force_closure_comparison, main, pose_errors, start_area
 from expert.errors import InvalidProblem
-from expert.grasping.problem import GraspProblem, GraspSolution
+from expert.problems.grasp import GraspProblem, GraspSolution
+from expert.world.shape import Shape
 
 CORNERS = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 TASK = GraspProblem(shape=Shape(vertices=0.05 * CORNERS), pose=np.array([0.02, 0.0, 0.0]))

@@ -11,8 +11,8 @@ from PIL import Image
 
 from expert.drawing.contact_trajectory import FRAMES_PER_STEP, draw
 from expert.errors import InvalidProblem
-from expert.types import ContactTask, Plan
-from tests.expert.hand_plans import lifted_block, pushed_block, sliding_block
+from expert.problems.contact import ContactTask, Plan
+from tests.support.hand_plans import lifted_block, pushed_block, sliding_block
 
 Made = Callable[[], tuple[ContactTask, Plan]]
 

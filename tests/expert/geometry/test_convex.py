@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from expert.geometry.convex import Region, convex_pieces, free_regions
 from expert.geometry.polygon import is_convex, reflex_vertices, signed_area, signed_distance
 from expert.geometry.pose import Array
-from tests.expert.polygons import AWKWARD, points_around, polygons
+from tests.support.polygons import AWKWARD, points_around, polygons
 
 
 def depth(regions: list[Region], points: Array) -> Array:

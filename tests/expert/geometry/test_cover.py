@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 import shapely
 
-from expert.caging.shapes import NAMES, named_shape, random_polygon
 from expert.geometry.cover import clip, half_planes, overlapping_cover
 from expert.geometry.polygon import diameter, is_convex, simple_polygon
 from expert.geometry.pose import Array
+from expert.world.named import named_shape
+from tests.support.polygons import CAGED, random_polygon
 
-POLYGONS = [named_shape(name) for name in NAMES] + [
+POLYGONS = [named_shape(name) for name in CAGED] + [
     random_polygon(np.random.default_rng(k), 4 + k % 9) for k in range(40)
 ]
 

@@ -21,7 +21,7 @@ from expert.geometry.polygon import (
     simple_polygon,
 )
 from expert.geometry.pose import Array, cross
-from tests.expert.polygons import AWKWARD, points_around, polygons
+from tests.support.polygons import AWKWARD, points_around, polygons
 
 
 @given(polygons())

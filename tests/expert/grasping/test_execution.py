@@ -4,23 +4,24 @@ import numpy as np
 import pytest
 
 from dlm.simulator.grasp import replay_grasp, replay_grasp_in_mujoco
-from expert.caging.problem import Shape
 from expert.files import read_problem
-from expert.grasping.problem import GraspProblem, GraspSolution
-from expert.grasping.shapes import grasp_shape, irregular_polygon
 from expert.grasping.sweeping import sweep
 from expert.grasping.synthesis import solve
-from expert.verify.finger_path import FingerPath
-from expert.verify.grasp import verify_grasp
-from expert.verify.start_set import StartSet
-from tests.expert.grasping.experiments import hard_starts
-from tests.expert.verify.jams import jams
+from expert.problems.grasp import GraspProblem, GraspSolution
+from expert.verify.grasp.check import verify_grasp
+from expert.verify.grasp.finger_path import FingerPath
+from expert.verify.grasp.start_set import StartSet
+from expert.world.named import named_shape
+from expert.world.shape import Shape
+from tests.support.experiments import hard_starts
+from tests.support.jams import jams
+from tests.support.polygons import irregular_polygon
 
 Certified = tuple[GraspProblem, GraspSolution, StartSet]
 TOLERANCE, ANGLE = 1e-5, np.radians(0.01)
 
 
-OBJECTS = {"bracket": grasp_shape("bracket"), "random": irregular_polygon(np.random.default_rng(3), 4)}
+OBJECTS = {"bracket": named_shape("bracket"), "random": irregular_polygon(np.random.default_rng(3), 4)}
 
 
 @pytest.fixture(scope="module", params=OBJECTS)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull, QhullError
 
-from expert.caging.problem import Shape
 from expert.geometry.polygon import mass_properties, signed_distance
 from expert.geometry.pose import Array, to_body
 from expert.grasping.force_closure import best_grasp, least_distance
-from expert.grasping.shapes import grasp_shape
+from expert.world.named import named_shape
+from expert.world.shape import Shape
 
-T = Shape(vertices=grasp_shape("T"))
+T = Shape(vertices=named_shape("T"))
 GRASP = best_grasp(T, 0.02)
 
 

@@ -10,16 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog, nnls
 
-from expert.caging.frame import Frame
-from expert.caging.problem import Shape
 from expert.geometry.polygon import signed_area
 from expert.geometry.pose import Array, rotation
 from expert.grasping.cell import GoalCell
 from expert.grasping.facets import Facets, rays, spans, tuples
 from expert.grasping.goal_cell import candidate, cells, largest_start, region, start_knot
 from expert.grasping.rows import Rows
-from expert.grasping.shapes import grasp_shape, irregular_polygon
 from expert.grasping.smooth import acceleration, smoothest
+from expert.world.frame import Frame
+from expert.world.named import named_shape
+from expert.world.shape import Shape
+from tests.support.polygons import irregular_polygon
 
 RANGES = np.radians([15, 11.25, 7.5, 3.75, 0.5])
 MARGIN = 0.002
@@ -31,7 +32,7 @@ def relative(vertices: Array) -> Array:
 
 
 def objects() -> dict[str, Array]:
-    named = {name: relative(grasp_shape(name)) for name in ("T", "hourglass", "arrow")}
+    named = {name: relative(named_shape(name)) for name in ("T", "hourglass", "arrow")}
     return named | {
         f"random {k}": relative(irregular_polygon(np.random.default_rng(k), 4 + k % 3)) for k in (2, 10)
     }

@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 
 from expert.errors import InvalidProblem
 from expert.files import problem_of, read_problem, read_solution, solution_of, write_solution
-from expert.grasping.problem import GraspProblem, GraspSolution
-from expert.grasping.shapes import NAMES, grasp_shape, irregular_polygon
+from expert.problems.grasp import GraspProblem, GraspSolution
+from expert.world.named import named_shape
+from tests.support.polygons import GRASPED, irregular_polygon
 
 FILES = sorted(Path("configs/problem/certified_grasp").glob("*.yaml"))
 SQUARE = [[-0.05, -0.05], [0.05, -0.05], [0.05, 0.05], [-0.05, 0.05]]
@@ -67,7 +68,7 @@ def test_every_file_is_read(path: Path) -> None:
 
 def test_random_and_named_files_hold_the_generated_shapes() -> None:
     expected = {f"random_{k:02d}": irregular_polygon(np.random.default_rng(k), 4 + k % 3) for k in range(12)}
-    expected |= {name.lower(): grasp_shape(name) for name in NAMES}
+    expected |= {name.lower(): named_shape(name) for name in GRASPED}
     for stem, vertices in expected.items():
         task = read_problem(f"configs/problem/certified_grasp/{stem}.yaml").task
         np.testing.assert_allclose(task.shape.vertices, vertices, atol=1e-6)

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 import shapely
 
-from expert.caging.frame import Frame
-from expert.caging.problem import Gripper, Shape
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import signed_area, signed_distance
 from expert.geometry.pose import Array, rotation, to_body
@@ -15,11 +13,15 @@ from expert.grasping.decomposed import fillings, smooth_path, topologies
 from expert.grasping.facets import Facets
 from expert.grasping.gripper import placements
 from expert.grasping.nested import FacetGeometry, Grasp, Knot, schedule
-from expert.grasping.problem import GraspProblem, GraspSolution
 from expert.grasping.proposals import Search, decomposed, goal_cells
-from expert.grasping.shapes import grasp_shape, irregular_polygon
 from expert.grasping.synthesis import solve
-from expert.verify.grasp import verify_grasp
+from expert.problems.grasp import GraspProblem, GraspSolution
+from expert.verify.grasp.check import verify_grasp
+from expert.world.fingers import Gripper
+from expert.world.frame import Frame
+from expert.world.named import named_shape
+from expert.world.shape import Shape
+from tests.support.polygons import irregular_polygon
 
 FOREVER = 1e9
 
@@ -53,7 +55,7 @@ def test_each_method_finds_a_grasp_that_the_checker_confirms(method: str) -> Non
 
 
 def test_promised_starts_are_free_and_as_large_as_the_checker_finds() -> None:
-    task = problem(Shape(vertices=grasp_shape("T")))
+    task = problem(Shape(vertices=named_shape("T")))
     answer = solve(task, time_limit=FOREVER)
     report = verify_grasp(task, answer.path, answer.facets)
     assert report.start.area == pytest.approx(shapely.Polygon(answer.starts).area, rel=1e-3)

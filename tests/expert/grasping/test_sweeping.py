@@ -7,13 +7,14 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize, nnls
 
-from expert.caging.problem import Shape
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import signed_distance
 from expert.geometry.pose import Array, to_body, to_world
-from expert.grasping.least_norm import least_norm
-from expert.grasping.shapes import grasp_shape, irregular_polygon
 from expert.grasping.sweeping import sweep
+from expert.numeric.least_norm import least_norm
+from expert.world.named import named_shape
+from expert.world.shape import Shape
+from tests.support.polygons import irregular_polygon
 
 HALF_WIDTH, HALF_HEIGHT = 0.05, 0.03
 BOX = Shape(
@@ -92,7 +93,7 @@ def test_a_finger_slips_off_a_corner_and_pushes_no_more() -> None:
 def test_a_finger_that_passes_by_moves_nothing(seed: int) -> None:
     """However close to a corner: beyond a sharp tip it is inside of one facet's half-plane and yet outside."""
     rng = np.random.default_rng(seed)
-    vertices = grasp_shape("hourglass") if seed % 2 else irregular_polygon(rng, int(rng.integers(4, 9)))
+    vertices = named_shape("hourglass") if seed % 2 else irregular_polygon(rng, int(rng.integers(4, 9)))
     size = Shape(vertices=vertices).size
     near = vertices[rng.integers(len(vertices))] + 0.008 * size * rng.normal(size=2)
     path = np.stack([near, near + 0.05 * size * rng.normal(size=2)])
@@ -143,7 +144,7 @@ def test_everything_may_be_moved_rigidly() -> None:
 @given(st.integers(0, 10**6))
 def test_no_finger_ever_enters_the_object(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    vertices = irregular_polygon(rng, int(rng.integers(4, 9))) if seed % 3 else grasp_shape("T")
+    vertices = irregular_polygon(rng, int(rng.integers(4, 9))) if seed % 3 else named_shape("T")
     shape = Shape(vertices=vertices)
     angles = rng.uniform(0, 2 * np.pi, 4)
     rays = np.column_stack([np.cos(angles), np.sin(angles)])

@@ -1,0 +1,5 @@
+"""Training in stages (Thesis 4.3)."""
+
+from dlm.training.stage import Schedule, Stage
+
+__all__ = ["Schedule", "Stage"]

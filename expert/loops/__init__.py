@@ -1,0 +1,1 @@
+"""Loops of obstacles around an object: shared by cages and by nested cages."""

@@ -1,0 +1,1 @@
+"""Small dense programs that several solvers use."""

@@ -1,0 +1,1 @@
+"""Is an object caged?  Proves it, or shows the way out."""

@@ -1,0 +1,1 @@
+"""Does every start of a set end in the grasp?"""

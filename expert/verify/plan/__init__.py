@@ -1,0 +1,1 @@
+"""Checks contact plans and proofs that there is none."""

@@ -1,0 +1,296 @@
+"""Checks a contact trajectory against the laws of mechanics, from poses, positions and forces alone.
+
+Nothing here knows how the plan was found: contact modes of the environment are read from the motion of material points,
+cones and costs are written out again.  Lengths are measured over the object's size L, forces over its weight m g.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from expert.errors import InvalidProblem
+from expert.geometry.polygon import signed_distance
+from expert.geometry.pose import Array, cross, perpendicular, to_body, to_world
+from expert.problems.contact import FREE, SUPPORT, ContactForce, ContactTask, Plan
+from expert.verify.plan.force_balance import first_unbalanced_step
+from expert.verify.plan.report import Check, PlanReport
+from expert.world.walls import HalfPlane
+
+FINGER = ("step", "finger")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tolerances:
+    """What a plan may miss: wrench over m g and m g L, force over m g, length over L, objective relative."""
+
+    wrench: float = 1e-8
+    force: float = 1e-6
+    length: float = 1e-6
+    objective: float = 1e-6
+
+
+def verify(task: ContactTask, answer: Plan | None) -> PlanReport:
+    """Judge any answer: plans by `check_plan`, proofs of infeasibility by an independent search for force balance."""
+    if answer is None:
+        raise InvalidProblem(
+            "file", expected="a solution file", got="a problem file", remedy="solve it first"
+        )
+    if answer.found:
+        return check_plan(task, answer)
+    if answer.status == "infeasible":
+        return check_infeasible(task)
+    return PlanReport(
+        verdict="unknown", claim=answer.status, note="the solver found no plan; nothing to check"
+    )
+
+
+def check_infeasible(task: ContactTask) -> PlanReport:
+    """sound where some step admits no force balance at all; unknown where each step does, taken by itself."""
+    step = first_unbalanced_step(task)
+    if step is not None:
+        note = f"no finger placement balances the forces at step {step}"
+        return PlanReport(verdict="sound", claim="infeasible", note=note)
+    note = "every step by itself admits a force balance; contact sequences are not searched"
+    return PlanReport(verdict="unknown", claim="infeasible", note=note)
+
+
+def check_plan(task: ContactTask, plan: Plan, tolerances: Tolerances | None = None) -> PlanReport:
+    """Judge a plan: sound, or refuted with every law that it breaks (Thesis 3-CT1 to 3-CT7 with exact torques)."""
+    limits = tolerances or Tolerances()
+    claim = f"{plan.status}, objective {plan.objective:.6g}, bound {plan.bound:.6g}"
+    if shape := _wrong_shape(task, plan):
+        return PlanReport(verdict="refuted", claim=claim, checks=(shape,))
+    checks = (
+        *_dynamics(task, plan, limits),
+        *_finger_forces(task, plan, limits),
+        *_finger_places(task, plan, limits),
+        *_contact_sequence(task, plan, limits),
+        *_environment(task, plan, limits),
+        *_cost(task, plan, limits),
+    )
+    verdict = "sound" if all(check.ok for check in checks) else "refuted"
+    return PlanReport(verdict=verdict, claim=claim, checks=checks)  # type: ignore[arg-type]
+
+
+def _wrong_shape(task: ContactTask, plan: Plan) -> Check | None:
+    """Arrays of the wrong shape or facets that do not exist: no other check makes sense."""
+    shape = (task.steps, task.fingers.count)
+    fits = plan.modes.shape == shape and plan.positions.shape == plan.forces.shape == (*shape, 2)
+    if fits and plan.modes.min() >= FREE and plan.modes.max() < len(task.body.vertices):
+        return None
+    return Check(name="shape", value=np.inf, limit=0.0, unit="-", where="modes, positions or forces")
+
+
+def _dynamics(task: ContactTask, plan: Plan, limits: Tolerances) -> tuple[Check, ...]:
+    """m a = sum f and I alpha = sum r x f, with weight among the forces (3-CT1, 3-CT2)."""
+    q = task.trajectory.poses
+    a = task.trajectory.accelerations
+    weight = task.weight if task.environment.plane == "sagittal" else 0.0
+    force = task.body.mass * a[:, :2] + [0.0, weight] - plan.forces.sum(axis=1)
+    torque = task.body.inertia * a[:, 2] - cross(plan.positions - q[:, None, :2], plan.forces).sum(axis=1)
+    for c in plan.contact_forces:
+        force[c.step] -= c.force
+        torque[c.step] -= cross(c.point - q[c.step, :2], c.force)
+    residual = np.column_stack([np.abs(force) / task.weight, np.abs(torque) / (task.weight * task.body.size)])
+    return (Check.largest("newton_euler", residual, limits.wrench, "m g, m g L", ("step", "component")),)
+
+
+def _finger_forces(task: ContactTask, plan: Plan, limits: Tolerances) -> tuple[Check, ...]:
+    """Forces of touching fingers in their cones and limits, of free fingers none (3-CT3, 3-CT4)."""
+    normal, tangential = _facet_components(task, plan)
+    touching = plan.modes != FREE
+    mu = task.robustness.cone_fraction * task.fingers.friction
+    outside = np.where(touching, np.maximum(np.abs(tangential) - mu * normal, -normal), 0.0)
+    free_force = np.where(touching, 0.0, np.linalg.norm(plan.forces, axis=2))
+    too_little = np.where(_may_push(plan), task.robustness.min_normal_force - normal, 0.0)
+    excess = np.where(touching, normal - task.fingers.max_force, 0.0)
+    named = {
+        "finger_cone": outside,
+        "complementarity": free_force,
+        "force_limit": excess,
+        "min_normal_force": too_little,
+    }
+    return tuple(
+        Check.largest(name, v / task.weight, limits.force, "m g", FINGER) for name, v in named.items()
+    )
+
+
+def _facet_components(task: ContactTask, plan: Plan) -> tuple[Array, Array]:
+    """Finger forces along the inward normal and the tangent of the claimed facet, each (T, C) [N]."""
+    frames = task.body.frames_w(task.trajectory.poses)
+    facet = np.maximum(plan.modes, 0)[..., None]
+    normal, tangent = (np.take_along_axis(frame, facet, axis=1) for frame in frames)
+    return (plan.forces * normal).sum(-1), (plan.forces * tangent).sum(-1)
+
+
+def _may_push(plan: Plan) -> np.ndarray:
+    """Steps (T, C) at which force is allowed: in contact now and, unless it is the last step, on the same facet next."""
+    stays = np.ones(plan.modes.shape, dtype=bool)
+    stays[:-1] = plan.modes[1:] == plan.modes[:-1]
+    return stays & (plan.modes != FREE)
+
+
+def _finger_places(task: ContactTask, plan: Plan, limits: Tolerances) -> tuple[Check, ...]:
+    """Touching fingers on their facets, free ones clear of the object, all of them clear of walls (3-CT3, 3-CT7)."""
+    touching = plan.modes != FREE
+    distance = np.stack([signed_distance(task.body.vertices, p) for p in _body_frame(task, plan.positions)])
+    wall_gap = np.stack(
+        [np.full(touching.shape, np.inf), *(w.gap(plan.positions) for w in task.environment.walls)]
+    )
+    named = {
+        "on_facet": np.where(touching, _distance_to_facet(task, plan), 0.0),
+        "penetration": -distance,
+        "clearance": np.where(touching, 0.0, task.robustness.free_clearance - distance),
+        "wall_clearance": task.fingers.clearance - wall_gap.min(axis=0),
+    }
+    return tuple(
+        Check.largest(name, v / task.body.size, limits.length, "L", FINGER) for name, v in named.items()
+    )
+
+
+def _body_frame(task: ContactTask, points: Array) -> Array:
+    """World points (T, C, 2) at the poses of their steps, in the body frame."""
+    return to_body(task.trajectory.poses, points)
+
+
+def _distance_to_facet(task: ContactTask, plan: Plan) -> Array:
+    """Distance (T, C) [m] of the fingers from their claimed facets without the margins at both ends."""
+    a, b = task.body.facets_w(task.trajectory.poses)
+    facet = np.maximum(plan.modes, 0)[..., None]
+    a, b = (np.take_along_axis(ends, facet, axis=1) for ends in (a, b))
+    edge = b - a
+    rho = ((plan.positions - a) * edge).sum(-1) / (edge * edge).sum(-1)
+    margin = task.fingers.facet_margin
+    nearest = a + np.clip(rho, margin, 1 - margin)[..., None] * edge
+    return np.linalg.norm(plan.positions - nearest, axis=-1)
+
+
+def _contact_sequence(task: ContactTask, plan: Plan, limits: Tolerances) -> tuple[Check, ...]:
+    """Sticking, release before another facet is taken, no force at the release, contacts that last (3-CT5)."""
+    now, later = plan.modes[:-1], plan.modes[1:]
+    body = _body_frame(task, plan.positions)
+    moved = np.linalg.norm(body[1:] - body[:-1], axis=2) / task.body.size
+    held = (now == later) & (now != FREE)
+    jumps = (now != later) & (now != FREE) & (later != FREE)
+    at_release = np.where(_may_push(plan), 0.0, np.linalg.norm(plan.forces, axis=2)) / task.weight
+    short = [
+        [float(task.robustness.min_interval - stop + start) for start, stop in _intervals(plan.modes[:, c])]
+        for c in range(task.fingers.count)
+    ]
+    return (
+        Check.largest("sticking", np.where(held, moved, 0.0), limits.length, "L", FINGER),
+        Check.largest("alternation", jumps, 0.0, "facet changes in contact", FINGER),
+        Check.largest("release", at_release, limits.force, "m g", FINGER),
+        Check.largest("min_interval", [max([0.0, *s]) for s in short], 0.0, "missing steps", ("finger",)),
+    )
+
+
+def _intervals(modes: np.ndarray) -> list[tuple[int, int]]:
+    """Contact intervals [start, stop) of one finger."""
+    changes = [0, *(np.flatnonzero(np.diff(modes)) + 1).tolist(), len(modes)]
+    return [(i, j) for i, j in itertools.pairwise(changes) if modes[i] != FREE]
+
+
+def _environment(task: ContactTask, plan: Plan, limits: Tolerances) -> tuple[Check, ...]:
+    """Walls push only where the object stays in touch with them, within their cones; the support drags (3-CT6)."""
+    on_walls = [c for c in plan.contact_forces if c.wall != SUPPORT]
+    places = [_wall_distance(task, c) / task.body.size for c in on_walls]
+    cones = [_outside_wall_cone(task, c) / task.weight for c in on_walls]
+    axes = ("contact force",)
+    return (
+        Check.largest("environment_contact", places, 2 * task.contact_tolerance / task.body.size, "L", axes),
+        Check.largest("environment_cone", cones, limits.force, "m g", axes),
+        *_support(task, plan, limits),
+    )
+
+
+def _displacement(task: ContactTask, step: int, point: Array) -> Array:
+    """How far the object's material point at `point` moves until the next pose, (2,) [m]."""
+    now, later = task.trajectory.extended[step + 1], task.trajectory.extended[step + 2]
+    return to_world(later, to_body(now, point[None]))[0] - point
+
+
+def _wall_distance(task: ContactTask, contact: ContactForce) -> float:
+    """How far [m] the force is from the stretch of wall where the object rests now and at the next pose."""
+    wall, touching = task.environment.walls[contact.wall], _touching(task, contact)
+    if not len(touching):
+        return np.inf
+    tangent = perpendicular(wall.normal)
+    along = touching @ tangent
+    inset = task.robustness.support_inset * np.ptp(along)
+    s = float(contact.point @ tangent)
+    beyond = max(along.min() + inset - s, s - along.max() + inset)
+    return max(float(beyond), abs(float(wall.gap(contact.point))))
+
+
+def _touching(task: ContactTask, contact: ContactForce) -> Array:
+    """Object vertices (n, 2) that touch the wall at the step and still do at the next pose, at the step."""
+    wall, extended = task.environment.walls[contact.wall], task.trajectory.extended[contact.step + 1 :][:2]
+    vertices = to_world(extended, task.body.vertices)
+    return vertices[0][(wall.gap(vertices) <= task.contact_tolerance).all(axis=0)]
+
+
+def _outside_wall_cone(task: ContactTask, contact: ContactForce) -> float:
+    """Distance [N] of a wall's force from what Coulomb allows: a cone at rest, its edge against the motion in sliding."""
+    wall: HalfPlane = task.environment.walls[contact.wall]
+    tangent = perpendicular(wall.normal)
+    normal, tangential = float(contact.force @ wall.normal), float(contact.force @ tangent)
+    slip = float(_displacement(task, contact.step, contact.point) @ tangent)
+    if abs(slip) > task.contact_tolerance:
+        return max(-normal, abs(tangential + np.sign(slip) * wall.friction * normal))
+    return max(-normal, abs(tangential) - task.robustness.cone_fraction * wall.friction * normal)
+
+
+def _support(task: ContactTask, plan: Plan, limits: Tolerances) -> tuple[Check, ...]:
+    """Each vertex bears m g / V: friction mu N against its motion, any force up to mu N at rest; in the sagittal plane none."""
+    vertices = to_world(task.trajectory.poses, task.body.vertices)
+    total, misplaced = np.zeros_like(vertices), np.zeros(vertices.shape[:2])
+    for c in plan.contact_forces:
+        if c.wall == SUPPORT:
+            total[c.step, c.vertex] += c.force
+            distance = float(np.linalg.norm(c.point - vertices[c.step, c.vertex]))
+            misplaced[c.step, c.vertex] = max(misplaced[c.step, c.vertex], distance)
+    transverse = task.environment.plane == "transverse"
+    disc = task.environment.support_friction * task.weight / len(task.body.vertices) if transverse else 0.0
+    motion = to_world(task.trajectory.extended[2:], task.body.vertices) - vertices
+    speed = np.linalg.norm(motion, axis=2)
+    slides = speed > task.contact_tolerance
+    drag = -disc * motion / np.where(slides, speed, 1.0)[..., None]
+    off_edge = np.linalg.norm(total - drag, axis=2)
+    off_disc = np.linalg.norm(total, axis=2) - disc
+    axes = ("step", "vertex")
+    return (
+        Check.largest(
+            "support_friction", np.where(slides, off_edge, off_disc) / task.weight, limits.force, "m g", axes
+        ),
+        Check.largest("support_contact", misplaced / task.body.size, limits.length, "L", axes),
+    )
+
+
+def _cost(task: ContactTask, plan: Plan, limits: Tolerances) -> tuple[Check, ...]:
+    """The stated objective is the plan's cost, and the stated bound does not exceed it."""
+    true = plan_cost(task, plan)
+    scale = max(abs(true), 1e-12)
+    excess = (plan.bound - plan.objective) / scale
+    unproved = np.inf if plan.status == "optimal" and not np.isfinite(plan.bound) else 0.0
+    return (
+        Check.largest("objective", abs(plan.objective - true) / scale, limits.objective, "objective", ()),
+        Check.largest("bound", max(excess, unproved), limits.objective, "objective", ()),
+    )
+
+
+def plan_cost(task: ContactTask, plan: Plan) -> float:
+    """sum |lambda|^2 + |p_ddot|^2 - beta (Thesis 3.1.4), p_ddot by backward differences from the third step on."""
+    p = plan.positions
+    acceleration = (p[2:] - 2 * p[1:-1] + p[:-2]) / task.trajectory.dt**2
+    cost = task.cost.force * (plan.forces**2).sum() + task.cost.acceleration * (acceleration**2).sum()
+    return float(cost - task.cost.margin * _distance_to_cone_edge(task, plan).sum())
+
+
+def _distance_to_cone_edge(task: ContactTask, plan: Plan) -> Array:
+    """Distance [N] of each finger force inside its full cone from the nearer edge, (T, C); none for free fingers."""
+    normal, tangential = _facet_components(task, plan)
+    mu = task.fingers.friction
+    distance = (mu * normal - np.abs(tangential)) / np.hypot(1.0, mu)
+    return np.where(plan.modes == FREE, 0.0, distance)

@@ -1,0 +1,50 @@
+"""Similarity between the world and the relative lengths in which cages are computed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from expert.geometry.pose import Array, rotation, to_world
+from expert.world.shape import Shape
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The object's reference point (centre of its enclosing circle) is its origin, the circle's radius [m] is 1, and the
+    start pose is the origin of configuration space.
+    """
+
+    centre: Array
+    radius: float
+    pose: Array
+
+    @classmethod
+    def of(cls, shape: Shape, pose: Array) -> "Frame":
+        """Frame of a shape at its start pose (3,)."""
+        circle = shapely.minimum_bounding_circle(shapely.MultiPoint(shape.vertices))
+        centre = np.array(circle.centroid.coords[0])
+        return cls(centre, float(np.linalg.norm(shape.vertices - centre, axis=1).max()), pose)
+
+    @property
+    def reference_w(self) -> Array:
+        """The reference point at the start pose (2,) [m], world."""
+        return to_world(self.pose, self.centre[None])[0]
+
+    def relative(self, points_w: Array) -> Array:
+        """World points (..., 2) [m] in the relative frame."""
+        return (points_w - self.reference_w) @ rotation(self.pose[2]) / self.radius
+
+    def world(self, points: Array) -> Array:
+        """Relative points (..., 2) in the world [m]."""
+        return self.reference_w + self.radius * points @ rotation(self.pose[2]).T
+
+    def body(self, points_b: Array) -> Array:
+        """Points (..., 2) of the body frame [m] in the relative frame at the start."""
+        return (points_b - self.centre) / self.radius
+
+    def world_pose(self, configuration: Array) -> Array:
+        """Body poses (..., 3) [m, rad] of relative configurations (..., 3)."""
+        angle = self.pose[2] + configuration[..., 2]
+        origin = self.world(configuration[..., :2]) - self.centre @ np.swapaxes(rotation(angle), -1, -2)
+        return np.concatenate([origin, angle[..., None]], axis=-1)

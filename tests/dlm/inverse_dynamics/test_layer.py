@@ -1,0 +1,297 @@
+from dataclasses import replace
+
+import pytest
+import torch
+from torch import Tensor
+
+from datasets.parameters import parameters_of
+from dlm.inverse_dynamics.data import QPSize, QPWeights
+from dlm.inverse_dynamics.layer import Action, InverseDynamics
+from dlm.inverse_dynamics.parameters import FLAGS, Layout, ParameterBatch
+from dlm.inverse_dynamics.problem import inverse_dynamics_problem
+from dlm.tasks import TaskBatch
+from expert.errors import InvalidProblem
+from expert.problems.contact import Cost
+from tests.support.labelled import labels
+
+LAYOUT = Layout()
+BACKENDS = ("cvxpylayers", "batched")
+WITHIN = 1e-4
+"""Bar of the equality test: positions over L, forces over m g."""
+
+
+@pytest.fixture(scope="module")
+def everyone() -> list:
+    return [*labels(6, (4, 6)), *labels(6, (12, 12))]
+
+
+@pytest.fixture(scope="module")
+def truth(everyone: list) -> ParameterBatch:
+    return ParameterBatch.stack([parameters_of(one.task, one.plan) for one in everyone])
+
+
+@pytest.fixture(scope="module")
+def generic(truth: ParameterBatch) -> Tensor:
+    """Rows (b, t, width) near the truth where the optimum is smooth: at the truth itself it can have corners."""
+    rows = LAYOUT.split(LAYOUT.flatten(truth))
+    noise = torch.Generator().manual_seed(0)
+    moved = {
+        n: 0.05 + 0.9 * x if n in FLAGS else x + 0.03 * torch.randn(x.shape, generator=noise, dtype=x.dtype)
+        for n, x in rows.items()
+    }
+    return torch.cat([x.flatten(2) for x in moved.values()], dim=-1)
+
+
+def misses(action: Action, everyone: list, truth: ParameterBatch) -> Tensor:
+    """Largest deviation from the expert's plan, (b,): positions where a finger touches, over L, and forces, over m g."""
+    size = torch.tensor([one.task.body.size for one in everyone], dtype=torch.float64)
+    weight = torch.tensor([one.task.weight for one in everyone], dtype=torch.float64)
+    position = (action.positions - truth.reference_positions).abs().amax(-1) * truth.contact
+    force = (action.forces - truth.reference_forces).abs()
+    return torch.maximum(position.amax((1, 2)) / size, force.amax((1, 2, 3)) / weight)
+
+
+def score(action: Action) -> Tensor:
+    """A smooth number per task, (b,), to differentiate."""
+    ramp = torch.linspace(-1, 1, action.positions[0].numel(), dtype=torch.float64).view(5, -1, 2)
+    return (10 * ramp * action.positions + ramp.flip(0) * action.forces).sum((1, 2, 3))
+
+
+def test_4_ct6_is_a_disciplined_parametrised_program() -> None:
+    weights = QPWeights.of(Cost(), dt=0.1, length=0.01, force=1.0, slack=1.0)
+    problem, _, _ = inverse_dynamics_problem(QPSize(), weights)
+    assert problem.is_dpp()
+
+
+@pytest.mark.parametrize("slack", [None, 300.0])
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_at_the_truth_the_optimum_is_the_expert_s_plan(
+    backend: str, slack: float | None, everyone: list, truth: ParameterBatch
+) -> None:
+    with torch.no_grad():
+        action = InverseDynamics(backend=backend, slack=slack)(truth)  # type: ignore[arg-type]
+    assert action.solved.all()
+    assert misses(action, everyone, truth).max() < WITHIN
+    assert action.slack.abs().max() < 1e-5
+
+
+def test_stored_tasks_keep_the_equality(tasks: TaskBatch) -> None:
+    with torch.no_grad():
+        action = InverseDynamics(backend="batched", slack=None)(tasks.parameters)
+    touching = tasks.parameters.contact[..., None]
+    position = (action.positions - tasks.positions).abs() * touching / tasks.size[:, None, None, None]
+    force = (action.forces - tasks.forces).abs() / tasks.weight[:, None, None, None]
+    assert action.solved.all()
+    assert position.max() < WITHIN
+    assert force.max() < WITHIN
+
+
+def test_without_its_ingredients_p_misses_the_plan(everyone: list, truth: ParameterBatch) -> None:
+    """The equality test can fail, and does so when P loses what the expert imposes."""
+    layer = InverseDynamics(backend="batched")
+    thesis = InverseDynamics(backend="batched", torque="thesis")
+    unheld = replace(truth, stick=truth.contact)  # pushes at release too, at another place
+    untied = replace(truth, cones=2 * truth.cones - truth.cones.flip(-2))  # wider cones
+    for other, parameters in ((thesis, truth), (layer, unheld), (layer, untied)):
+        with torch.no_grad():
+            missed = misses(other(parameters), everyone, truth) > WITHIN
+        assert missed.any()
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_gradients_agree_with_finite_differences(backend: str, generic: Tensor) -> None:
+    layer = InverseDynamics(backend=backend)  # type: ignore[arg-type]
+    rows = generic.clone().requires_grad_()
+    score(layer(LAYOUT.unflatten(rows))).sum().backward()
+    noise = torch.Generator().manual_seed(1)
+    directions = [torch.randn(rows.shape, generator=noise, dtype=rows.dtype) for _ in range(8)]
+    exact = InverseDynamics(backend="batched")
+    h = 1e-6
+    with torch.no_grad():
+        differences = torch.stack(
+            [
+                (
+                    score(exact(LAYOUT.unflatten(generic + h * d)))
+                    - score(exact(LAYOUT.unflatten(generic - h * d)))
+                )
+                / (2 * h)
+                for d in directions
+            ]
+        )
+    slopes = torch.stack([(rows.grad * d).sum((1, 2)) for d in directions])
+    cosine = torch.cosine_similarity(slopes, differences, dim=0)
+    assert cosine.min() > 0.999, cosine
+    torch.testing.assert_close(slopes.norm(dim=0), differences.norm(dim=0), rtol=1e-2, atol=0)
+
+
+def test_two_backends_agree(generic: Tensor) -> None:
+    actions, gradients = [], []
+    for backend in BACKENDS:
+        rows = generic.clone().requires_grad_()
+        action = InverseDynamics(backend=backend)(LAYOUT.unflatten(rows))  # type: ignore[arg-type]
+        score(action).sum().backward()
+        actions.append(action)
+        gradients.append(rows.grad.flatten(1))
+    torch.testing.assert_close(actions[0].positions, actions[1].positions, rtol=0, atol=1e-5)
+    torch.testing.assert_close(actions[0].forces, actions[1].forces, rtol=0, atol=1e-3)
+    assert torch.cosine_similarity(*gradients).min() > 0.999
+
+
+def test_positions_feel_the_cones_through_the_first_order_torque_alone(generic: Tensor) -> None:
+    sizes = {}
+    for torque in ("first_order", "thesis"):
+        rows = generic.clone().requires_grad_()
+        action = InverseDynamics(backend="batched", torque=torque)(LAYOUT.unflatten(rows))  # type: ignore[arg-type]
+        action.positions.sum().backward()
+        sizes[torque] = LAYOUT.split(rows.grad)["cones"].abs().amax((1, 2, 3, 4))
+    assert (sizes["first_order"] > 1e-6).all()
+    assert sizes["thesis"].max() < 1e-9
+
+
+def test_the_solution_obeys_4_ct6(generic: Tensor) -> None:
+    """The constraints stated a second time, in SI and with the flags' meaning at 0 and 1."""
+    rows = LAYOUT.split(generic)
+    P = LAYOUT.unflatten(
+        torch.cat([(x.round() if n in FLAGS else x).flatten(2) for n, x in rows.items()], dim=-1)
+    )
+    with torch.no_grad():
+        action = InverseDynamics(backend="batched")(P)
+    p, lam = action.positions, action.forces
+    start, edge = P.facets[..., 0, :], P.facets[..., 1, :] - P.facets[..., 0, :]
+    rho = ((p - start) * edge).sum(-1) / edge.square().sum(-1)
+    off = (p - start - rho[..., None] * edge).norm(dim=-1) * P.contact
+    assert off.max() < 1e-7
+    touching = P.contact == 1
+    assert rho[touching].min() > -1e-6
+    assert rho[touching].max() < 1 + 1e-6
+    held = (P.stick[:, :-1] == 1) & touching[:, :-1] & touching[:, 1:]
+    assert (rho[:, 1:] - rho[:, :-1])[held].abs().max() < 1e-6
+    weights = torch.linalg.solve(P.cones.transpose(-1, -2), lam[..., None])[..., 0]
+    assert weights.min() > -1e-6
+    assert lam[P.stick == 0].abs().max() < 1e-8
+    normal = weights.sum(-1)[P.stick == 1]
+    assert (normal > P.force_limits[P.stick == 1][:, 0] - 1e-6).all()
+    # Newton-Euler: what fingers and slack leave over is in the ground's cone, and nil without ground contact.
+    couple = (P.reference_positions - P.poses[:, :, None, :2]), (p - P.reference_positions)
+    torque = _cross(couple[0], lam) + _cross(couple[1], P.reference_forces)
+    wrench = torch.cat([lam.sum(2), torque.sum(2)[..., None]], dim=-1)
+    left = P.wrench - wrench - action.slack
+    airborne = (P.external_contact == 0).all(-1)
+    assert airborne.any()
+    assert left[airborne].abs().max() < 1e-6
+
+
+def _cross(u: Tensor, v: Tensor) -> Tensor:
+    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+
+
+def test_flags_between_0_and_1_lead_from_free_to_held(truth: ParameterBatch) -> None:
+    layer = InverseDynamics(backend="batched")
+    shifted = replace(truth, facets=truth.facets + 0.01)  # the fingers would rather stay
+    distance = []
+    for share in (0.0, 0.5, 0.9, 0.99, 1.0):
+        flagged = replace(shifted, contact=share * truth.contact)
+        with torch.no_grad():
+            p = layer(flagged).positions
+        start, edge = shifted.facets[..., 0, :], shifted.facets[..., 1, :] - shifted.facets[..., 0, :]
+        rho = ((p - start) * edge).sum(-1, keepdim=True) / edge.square().sum(-1, keepdim=True)
+        distance.append(float(((p - start - rho.clamp(0, 1) * edge).norm(dim=-1) * truth.contact).mean()))
+    assert distance == sorted(distance, reverse=True)
+    assert distance[0] > 1e-3
+    assert distance[-2] < 1e-4
+    assert distance[-1] < 1e-8
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_slack_supplies_what_nobody_else_can(backend: str, truth: ParameterBatch) -> None:
+    alone = replace(
+        truth, stick=torch.zeros_like(truth.stick), external_contact=torch.zeros_like(truth.external_contact)
+    ).map(lambda x: x[:2])
+    with torch.no_grad():
+        action = InverseDynamics(backend=backend, torque="thesis")(alone)  # type: ignore[arg-type]
+    assert action.solved.all()
+    torch.testing.assert_close(action.slack, alone.wrench, rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("defect", ["nan", "infeasible"])
+def test_an_unsolvable_item_never_spoils_its_batch(backend: str, defect: str, truth: ParameterBatch) -> None:
+    layer = InverseDynamics(backend=backend, slack=None)  # type: ignore[arg-type]
+    rows = LAYOUT.flatten(truth)[:4].clone()
+    spoilt = LAYOUT.unflatten(rows)
+    wrench, bad = spoilt.wrench.clone(), 2
+    wrench[bad, 1] = torch.nan if defect == "nan" else 1e3  # more than any finger may push
+    rows = LAYOUT.flatten(replace(spoilt, wrench=wrench)).requires_grad_()
+    action = layer(LAYOUT.unflatten(rows))
+    score(action).sum().backward()
+    good = [0, 1, 3]
+    assert action.solved.tolist() == [True, True, False, True]
+    assert (action.positions[bad] == 0).all()
+    assert (action.forces[bad] == 0).all()
+    assert (rows.grad[bad] == 0).all()
+    clean = LAYOUT.flatten(truth)[good].clone().requires_grad_()
+    alone = layer(LAYOUT.unflatten(clean))
+    score(alone).sum().backward()
+    assert torch.equal(alone.positions, action.positions[good])
+    assert torch.equal(clean.grad, rows.grad[good])
+
+
+def random_rows(truth: ParameterBatch, count: int, seed: int) -> Tensor:
+    """Half around the truth (noise of 0.01 to 1 times the scales), half pure noise of up to 10 times the scales."""
+    source = torch.Generator().manual_seed(seed)
+    flat = LAYOUT.flatten(truth)
+    near = flat[torch.randint(len(flat), (count,), generator=source)]
+    noise = torch.randn(near.shape, generator=source, dtype=flat.dtype)
+    size = 10 ** (3 * torch.rand(count, 1, 1, generator=source, dtype=flat.dtype) - 2)
+    pure = torch.arange(count)[:, None, None] % 2 == 1
+    return torch.where(pure, LAYOUT.squash(size * noise), near + size.clamp(max=1) * noise)
+
+
+def assert_no_nan(layer: InverseDynamics, rows: Tensor) -> float:
+    """Share of solved items."""
+    rows = rows.requires_grad_()
+    action = layer(LAYOUT.unflatten(rows))
+    (score(action).sum() + action.slack.abs().sum()).backward()
+    for value in (action.positions, action.forces, action.slack, rows.grad):
+        assert value.isfinite().all()
+    assert (rows.grad[~action.solved] == 0).all()
+    return float(action.solved.double().mean())
+
+
+@pytest.mark.parametrize(("backend", "count", "solved"), [("cvxpylayers", 60, 0.6), ("batched", 600, 0.99)])
+def test_random_parameters_give_no_nan(
+    backend: str, count: int, solved: float, truth: ParameterBatch
+) -> None:
+    layer = InverseDynamics(backend=backend)  # type: ignore[arg-type]
+    assert assert_no_nan(layer, random_rows(truth, count, seed=0)) >= solved
+
+
+@pytest.mark.slow
+def test_ten_thousand_random_parameters_give_no_nan(truth: ParameterBatch) -> None:
+    layer = InverseDynamics(backend="batched")
+    shares = [assert_no_nan(layer, random_rows(truth, 1000, seed)) for seed in range(1, 11)]
+    assert min(shares) > 0.99
+
+
+@pytest.mark.parametrize(
+    ("field", "options"),
+    [
+        ("torque", {"torque": "second_order"}),
+        ("backend", {"backend": "gurobi"}),
+        ("slack", {"slack": 0.0}),
+        ("cost.force", {"cost": Cost(force=0.0)}),
+        ("cost.acceleration", {"cost": Cost(acceleration=0.0)}),
+        ("cost.margin", {"cost": Cost(margin=1.0)}),
+    ],
+)
+def test_bad_options_are_refused(field: str, options: dict) -> None:
+    with pytest.raises(InvalidProblem) as caught:
+        InverseDynamics(**options)
+    assert caught.value.field == field
+
+
+def test_sizes_that_do_not_fit_are_refused(truth: ParameterBatch) -> None:
+    with pytest.raises(InvalidProblem, match="steps: expected at least 3"):
+        QPSize(steps=2)
+    with pytest.raises(InvalidProblem, match="parameters: expected QPSize"):
+        InverseDynamics(QPSize(rows=3), backend="batched")(truth)

@@ -1,0 +1,138 @@
+"""Random and awkward simple polygons [m]: seeded ones, and strategies for property-based tests."""
+
+import numpy as np
+import shapely
+from hypothesis import strategies as st
+
+from expert.geometry.pose import Array
+
+CAGED = ("T", "I", "M", "hourglass", "hooks")
+"""Named shapes that cages are searched for."""
+GRASPED = ("T", "hourglass", "I", "M", "bracket", "arrow")
+"""Named shapes that are grasped."""
+IRREGULARITY, SPIKINESS, RADIUS = 0.5, 0.3, 0.05
+
+AWKWARD: dict[str, Array] = {
+    name: np.array(points, dtype=float) * 0.01
+    for name, points in {
+        "T": [(-1, -5), (1, -5), (1, 1), (5, 1), (5, 3), (-5, 3), (-5, 1), (-1, 1)],
+        "C": [(0, 0), (6, 0), (6, 2), (2, 2), (2, 4), (6, 4), (6, 6), (0, 6)],
+        "L": [(0, 0), (4, 0), (4, 1), (1, 1), (1, 4), (0, 4)],
+        "comb": [
+            (0, 0),
+            (7, 0),
+            (7, 5),
+            (6, 5),
+            (6, 1),
+            (4, 1),
+            (4, 5),
+            (3, 5),
+            (3, 1),
+            (1, 1),
+            (1, 5),
+            (0, 5),
+        ],
+        "spiral": [
+            (0, 0),
+            (7, 0),
+            (7, 7),
+            (2, 7),
+            (2, 3),
+            (4, 3),
+            (4, 5),
+            (5, 5),
+            (5, 2),
+            (1, 2),
+            (1, 8),
+            (0, 8),
+        ],
+        "hourglass": [(-4, -5), (4, -5), (0.2, 0), (4, 5), (-4, 5), (-0.2, 0)],
+        "collinear vertices": [(0, 0), (2, 0), (4, 0), (4, 4), (2, 4), (0, 4), (0, 2)],
+        "notch to the hull": [(0, 0), (6, 0), (6, 4), (4, 4), (3, 1), (2, 4), (0, 4)],
+        "sliver": [(0, 0), (10, 0), (10, 0.01), (0, 0.02)],
+    }.items()
+}
+
+
+@st.composite
+def polygons(draw: st.DrawFn, least: int = 3, most: int = 9) -> Array:
+    """Simple polygon (V, 2) [m], counter-clockwise, about 10 cm large and anywhere within a metre: star-shaped or awkward."""
+    place = np.array([draw(st.floats(-1, 1)), draw(st.floats(-1, 1))])
+    if most >= 12 or draw(st.integers(0, 3)) == 0:
+        fitting = [v for v in AWKWARD.values() if least <= len(v)]
+        if fitting and draw(st.booleans()):
+            return place + draw(st.sampled_from(fitting))
+    count = draw(st.integers(least, most))
+    gaps = np.array([draw(st.floats(1.0, 2.0)) for _ in range(count)])
+    angles = draw(st.floats(0, 2 * np.pi)) + 2 * np.pi * np.cumsum(gaps) / gaps.sum()
+    radii = np.array([draw(st.floats(0.015, 0.06)) for _ in range(count)])
+    return place + radii[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def points_around(vertices: Array, count: int, seed: int, room: float = 0.5) -> Array:
+    """Uniform points (count, 2) in the polygon's bounding box, grown by `room` times its size on each side."""
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    grow = room * (high - low).max()
+    return np.random.default_rng(seed).uniform(low - grow, high + grow, (count, 2))
+
+
+def random_polygon(rng: np.random.Generator, facets: int, *, size: float = 0.1) -> Array:
+    """Simple polygon (facets, 2) of about the given diameter [m], drawn until no corner or neck is needle-thin."""
+    while True:
+        steps = rng.dirichlet(np.full(facets, 3.0))
+        angles = 2 * np.pi * np.cumsum(steps)
+        radii = rng.uniform(0.35, 1.0, facets)
+        v = radii[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+        polygon = shapely.Polygon(v)
+        if steps.max() < 0.45 and polygon.is_valid and _thick(polygon, v):
+            return size / 2 * v
+
+
+def random_nonconvex_polygon(rng: np.random.Generator, facets: int, *, size: float = 0.1) -> Array:
+    """A random polygon whose hull has at least 15 % more area: two fingers may find something to hold on to."""
+    while True:
+        v = random_polygon(rng, facets, size=size)
+        if shapely.Polygon(v).area < 0.87 * shapely.MultiPoint(v).convex_hull.area:
+            return v
+
+
+def _thick(polygon: shapely.Polygon, v: Array) -> bool:
+    """Corners of at least 20 degrees, edges of at least 0.15, and one piece when eroded by 0.05."""
+    ahead, back = np.roll(v, -1, axis=0) - v, np.roll(v, 1, axis=0) - v
+    lengths = np.linalg.norm(ahead, axis=1)
+    cosines = (ahead * back).sum(axis=1) / (lengths * np.linalg.norm(back, axis=1))
+    core = polygon.buffer(-0.05)
+    return bool(
+        lengths.min() > 0.15 and cosines.max() < np.cos(np.radians(20)) and core.geom_type == "Polygon"
+    )
+
+
+def irregular_polygon(
+    rng: np.random.Generator,
+    facets: int,
+    *,
+    irregularity: float = IRREGULARITY,
+    spikiness: float = SPIKINESS,
+    radius: float = RADIUS,
+) -> Array:
+    """Simple polygon (facets, 2) [m] about the origin, drawn until it has neither needles nor slivers.
+
+    irregularity: largest relative deviation of the angles between corners.  spikiness: standard deviation of the corners'
+    distances from the origin over `radius`, their mean.
+    """
+    while True:
+        steps = 1 + rng.uniform(-irregularity, irregularity, facets)
+        angles = rng.uniform(0, 2 * np.pi) + 2 * np.pi * np.cumsum(steps) / steps.sum()
+        radii = np.clip(rng.normal(1, spikiness, facets), 0.2, 2)
+        v = radius * radii[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+        if shapely.Polygon(v).is_valid and _sturdy(v, radius):
+            return v
+
+
+def _sturdy(v: Array, radius: float) -> bool:
+    """Corners between 20 and 340 degrees that are not flat, and edges of at least a quarter of the radius."""
+    ahead, back = np.roll(v, -1, axis=0) - v, np.roll(v, 1, axis=0) - v
+    lengths = np.linalg.norm(ahead, axis=1)
+    cosines = (ahead * back).sum(axis=1) / (lengths * np.linalg.norm(back, axis=1))
+    sharp, flat = cosines.max() > np.cos(np.radians(20)), cosines.min() < np.cos(np.radians(172))
+    return bool(lengths.min() > 0.25 * radius and not sharp and not flat)
