@@ -48,8 +48,8 @@ class Closures:
         self.centre = (self.vertices.min(axis=0) + self.vertices.max(axis=0)) / 2
         self.inward, _ = facet_frames(self.vertices)
         self.twists = _sphere(TWISTS)
-        walls = problem.walls.reshape(-1, 2)
-        self.walls = to_body(problem.pose, walls).reshape(-1, 2, 2) if len(walls) else problem.walls
+        ends = problem.wall_ends
+        self.walls = to_body(problem.pose, ends.reshape(-1, 2)).reshape(ends.shape)
         self.given = self._given()
 
     def candidates(self, rng: np.random.Generator) -> Iterator[Array]:

@@ -16,7 +16,7 @@ def rings(problem: CageProblem, frame: Frame) -> Iterator[list[Element]]:
     around = [Element(ends=np.stack([p, p])) for p in fixed[np.argsort(np.arctan2(*fixed.T[::-1]))]]
     for order in _orders(problem):
         free = [Element(finger=k) for k in order]
-        for a, b in frame.relative(problem.walls):
+        for a, b in frame.relative(problem.wall_ends):
             ends = np.stack([a, b])
             yield [*free, *around, Element(ends=ends, joined=True), Element(ends=ends)]
         if len(free) + len(around) >= 2:

@@ -79,7 +79,7 @@ def linked_slices(arrangement: Arrangement, angles: Array) -> list[list[shapely.
     """At each orientation the free components that a chain of overlapping ones links to the start."""
     start = int(np.abs(angles - arrangement.pose[2]).argmin())
     slices = [
-        free_components(arrangement.shape, arrangement.fingers, arrangement.walls, float(angle))
+        free_components(arrangement.shape, arrangement.fingers, arrangement.wall_ends, float(angle))
         for angle in angles
     ]
     here = shapely.Point(arrangement.pose[:2]).buffer(1e-3 * arrangement.shape.size)

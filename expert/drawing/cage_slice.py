@@ -23,8 +23,8 @@ def draw_slice(axes: Axes, arrangement: Arrangement, answer: CageSolution | None
     Dashed: the loop of obstacles that the model found, where it names one.
     """
     angle = float(arrangement.pose[2])
-    obstacles = obstacles_at(arrangement.shape, arrangement.fingers, arrangement.walls, angle)
-    free = free_components(arrangement.shape, arrangement.fingers, arrangement.walls, angle)
+    obstacles = obstacles_at(arrangement.shape, arrangement.fingers, arrangement.wall_ends, angle)
+    free = free_components(arrangement.shape, arrangement.fingers, arrangement.wall_ends, angle)
     _draw_obstacles(axes, arrangement, obstacles)
     _draw_free(axes, arrangement, free)
     if answer is not None and answer.topology:

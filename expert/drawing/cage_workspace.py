@@ -61,7 +61,7 @@ def draw_object(axes: Axes, arrangement: Arrangement, pose: Array) -> None:
         axes.fill(*to_world(pose, piece).T, color=OBJECT, ec="#c6bdae", lw=0.6, zorder=2)
     outline = to_world(pose, arrangement.shape.vertices)
     axes.plot(*_closed(outline).T, color=EDGE, lw=1.2, zorder=3)
-    for wall in arrangement.walls:
+    for wall in arrangement.wall_ends:
         _draw_wall(axes, wall, outline)
     for k, finger in enumerate(arrangement.fingers):
         axes.plot(*finger, "o", color=finger_colour(k), ms=8, mec="white", mew=0.8, zorder=5)

@@ -103,11 +103,11 @@ def _draw_slices(axes: Axes, task: GraspProblem, answer: GraspSolution) -> None:
     """Free positions around the goal at its orientation, knot by knot, among the obstacles of the first."""
     angle, here = float(task.pose[2]), shapely.Point(task.pose[:2])
     first = arrangement_at(task, answer, 0.0)
-    for obstacle in obstacles_at(first.shape, first.fingers, first.walls, angle):
+    for obstacle in obstacles_at(first.shape, first.fingers, first.wall_ends, angle):
         axes.fill(*np.array(obstacle.exterior.coords).T, color="#cfc9bd", ec=EDGE, lw=0.5, alpha=0.6)
     reach = 0.0
     for k in range(len(answer.path)):
-        for part in free_components(task.shape, answer.fingers(float(k)), first.walls, angle):
+        for part in free_components(task.shape, answer.fingers(float(k)), first.wall_ends, angle):
             if part.distance(here) < 1e-6 * task.shape.size:
                 outline = np.array(part.exterior.coords)
                 reach = max(reach, float(np.abs(outline - task.pose[:2]).max()))

@@ -144,10 +144,10 @@ def draw_start_set(axes: Axes, task: GraspProblem, answer: GraspSolution) -> Non
     """The object at its goal, fingers at the start, and in blue where its reference point may be, at true scale."""
     first = arrangement_at(task, answer, 0.0)
     angle, here = float(task.pose[2]), shapely.Point(task.pose[:2])
-    for obstacle in obstacles_at(first.shape, first.fingers, first.walls, angle):
+    for obstacle in obstacles_at(first.shape, first.fingers, first.wall_ends, angle):
         axes.plot(*np.array(obstacle.exterior.coords).T, color=EDGE, lw=0.4, alpha=0.5)
     axes.plot(*_closed(to_world(task.pose, task.shape.vertices)).T, color=GOAL, lw=1.2)
-    for part in free_components(first.shape, first.fingers, first.walls, angle):
+    for part in free_components(first.shape, first.fingers, first.wall_ends, angle):
         if part.distance(here) < 1e-6 * task.shape.size:
             axes.fill(*np.array(part.exterior.coords).T, color=PATH, lw=0.8, zorder=3)
     for finger in np.swapaxes(answer.path, 0, 1):

@@ -10,6 +10,7 @@ from expert.geometry.pose import Array
 from expert.problems.cage import Arrangement, CageProblem, CageSolution, CageStatus, HalfRanges, Meeting
 from expert.world.fingers import Gripper
 from expert.world.shape import Shape
+from expert.world.walls import Segment
 
 if TYPE_CHECKING:
     from expert.files import Problem
@@ -28,16 +29,16 @@ def read(data: dict[str, Any]) -> tuple[CageProblem | Arrangement, dict[str, Any
     file.text("description", "")
     shape = _read_shape(file.section("object", ("vertices", "pieces")))
     pose = file.array("pose", (3,)) if "pose" in file else np.zeros(3)
-    walls = [
-        np.stack([wall.array("from", (2,)), wall.array("to", (2,))])
+    walls = tuple(
+        Segment(ends=np.stack([wall.array("from", (2,)), wall.array("to", (2,))]), name=wall.name)
         for wall in file.sections("walls", ("from", "to"))
-    ]
+    )
     fingers = file.section(
         "fingers", ("count", "fewest", "positions", "fixed", "grippers", "parallel", "direction")
     )
     fixed = fingers.array("fixed", (None, 2)) if "fixed" in fingers else np.empty((0, 2))
     options = file.section("options", ("margin", "rotation", "time_limit", "method", "solver"), optional=True)
-    common: dict[str, Any] = {"shape": shape, "pose": pose, "walls": np.reshape(walls, (-1, 2, 2))}
+    common: dict[str, Any] = {"shape": shape, "pose": pose, "walls": walls}
     if "positions" in fingers:
         return _read_arrangement(file, fingers, fixed, common), {}
     problem = CageProblem(

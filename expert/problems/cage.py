@@ -4,6 +4,7 @@ The object is a polygon in its body frame [m].  Fingers are points and walls are
 open interior must not meet them: touching is allowed.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -16,7 +17,7 @@ from expert.geometry.pose import Array, to_body
 from expert.world.fingers import Gripper
 from expert.world.shape import Shape
 from expert.world.values import readonly, require
-from expert.world.walls import wall_segments
+from expert.world.walls import Segment, segment_ends
 
 START_TOLERANCE = 1e-7
 """A finger or wall may enter the object at the start pose by this fraction of its diameter."""
@@ -24,7 +25,7 @@ START_TOLERANCE = 1e-7
 
 @dataclass(frozen=True, kw_only=True)
 class Arrangement:
-    """An object at a pose (3,) among fingers (N, 2) and walls (W, 2, 2): is it caged?
+    """An object at a pose (3,) among fingers (N, 2) and walls: is it caged?
 
     Raises InvalidProblem for fewer than two fingers, and for fingers or walls inside the object.
     """
@@ -32,12 +33,11 @@ class Arrangement:
     shape: Shape
     pose: Array
     fingers: Array
-    walls: Array = field(default_factory=lambda: np.empty((0, 2, 2)))
+    walls: tuple[Segment, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", readonly(self.pose, (3,), "pose"))
         object.__setattr__(self, "fingers", readonly(self.fingers, (None, 2), "fingers.positions"))
-        object.__setattr__(self, "walls", wall_segments(self.walls))
         count = len(self.fingers)
         require(count >= 2, "fingers.positions", "at least 2 fingers", count, "one point cannot cage")
         inside = signed_distance(self.shape.vertices, to_body(self.pose, self.fingers))
@@ -52,16 +52,21 @@ class Arrangement:
         require_walls_outside(self.shape, self.pose, self.walls)
 
     @property
+    def wall_ends(self) -> Array:
+        """Ends of the walls (W, 2, 2) [m]."""
+        return segment_ends(self.walls)
+
+    @property
     def start_tolerance(self) -> float:
         """Depth [m] to which obstacles may enter the object at its start pose."""
         return START_TOLERANCE * self.shape.size
 
 
-def require_walls_outside(shape: Shape, pose: Array, walls: Array) -> None:
+def require_walls_outside(shape: Shape, pose: Array, walls: Iterable[Segment]) -> None:
     """Raise InvalidProblem for a wall that enters the object."""
     core = shapely.Polygon(shape.vertices).buffer(-START_TOLERANCE * shape.size, join_style="mitre")
-    for k, ends in enumerate(walls):
-        crosses = core.intersects(shapely.LineString(to_body(pose, ends)))
+    for k, wall in enumerate(walls):
+        crosses = core.intersects(shapely.LineString(to_body(pose, wall.ends)))
         require(not crosses, f"walls[{k}]", "a segment outside the object", "one that enters it", "move it")
 
 
@@ -84,7 +89,7 @@ class CageProblem:
     count: int
     fewest: bool = False
     fixed: Array = field(default_factory=lambda: np.empty((0, 2)))
-    walls: Array = field(default_factory=lambda: np.empty((0, 2, 2)))
+    walls: tuple[Segment, ...] = ()
     grippers: tuple[Gripper, ...] = ()
     parallel: bool = False
     direction: float | None = None
@@ -96,7 +101,6 @@ class CageProblem:
         object.__setattr__(self, "pose", readonly(self.pose, (3,), "pose"))
         fixed = readonly(np.reshape(self.fixed, (-1, 2)), (None, 2), "fingers.fixed")
         object.__setattr__(self, "fixed", fixed)
-        object.__setattr__(self, "walls", wall_segments(self.walls))
         self._require_counts()
         self._require_ranges()
         inside = signed_distance(self.shape.vertices, to_body(self.pose, fixed))
@@ -104,6 +108,11 @@ class CageProblem:
             outside = distance >= -START_TOLERANCE * self.shape.size
             require(outside, f"fingers.fixed[{k}]", "a point outside the object", "one inside it")
         require_walls_outside(self.shape, self.pose, self.walls)
+
+    @property
+    def wall_ends(self) -> Array:
+        """Ends of the walls (W, 2, 2) [m]."""
+        return segment_ends(self.walls)
 
     def _require_counts(self) -> None:
         require(self.count >= 0, "fingers.count", "a number >= 0", self.count)

@@ -1,8 +1,10 @@
-"""Walls: half-planes, and segments that bound the object from both sides."""
+"""Walls: half-planes, whose other side is solid, and segments, which bound the object from both sides."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from expert.geometry.pose import Array
 from expert.world.values import readonly, require
@@ -35,10 +37,28 @@ class HalfPlane:
         return (np.asarray(points) - self.point) @ self.normal
 
 
-def wall_segments(walls: object) -> Array:
-    """Checked segments (W, 2 ends, 2) [m].  Raises InvalidProblem."""
-    listed = np.empty((0, 2, 2)) if walls is None or np.size(walls) == 0 else walls  # type: ignore[arg-type]
-    segments = readonly(listed, (None, 2, 2), "walls")
-    for k, (a, b) in enumerate(segments):
-        require(bool((a != b).any()), f"walls[{k}]", "two different ends", "a point")
-    return segments
+@dataclass(frozen=True, kw_only=True)
+class Segment:
+    """Wall without thickness between two ends (2, 2) [m], world frame."""
+
+    ends: Array
+    name: str = "wall"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ends", readonly(self.ends, (2, 2), self.name))
+        apart = bool((self.ends[0] != self.ends[1]).any())
+        require(apart, self.name, "two different ends", "a point")
+
+
+Wall = HalfPlane | Segment
+
+
+def segments(ends: ArrayLike) -> tuple[Segment, ...]:
+    """Segments with the given ends (W, 2, 2) [m].  Raises InvalidProblem."""
+    listed = readonly(np.reshape(ends, (-1, 2, 2)), (None, 2, 2), "walls")
+    return tuple(Segment(ends=pair, name=f"walls[{k}]") for k, pair in enumerate(listed))
+
+
+def segment_ends(walls: Iterable[Segment]) -> Array:
+    """Ends (W, 2, 2) [m] of segments."""
+    return np.array([wall.ends for wall in walls], dtype=float).reshape(-1, 2, 2)

@@ -49,7 +49,7 @@ def contradictions(seed: int, arrangement: Arrangement, report: CageReport) -> l
 
 def sampled_fault(arrangement: Arrangement, path: Array) -> str | None:
     """A third, plain check: the polygon itself at poses along the path, fingers and walls outside it."""
-    fingers, walls = shapely.points(arrangement.fingers), shapely.linestrings(arrangement.walls)
+    fingers, walls = shapely.points(arrangement.fingers), shapely.linestrings(arrangement.wall_ends)
     depth = 2e-7 * arrangement.shape.size
     for a, b in itertools.pairwise(path):
         for pose in _between(a, b, 7):

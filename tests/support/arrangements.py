@@ -7,6 +7,7 @@ from expert.geometry.polygon import facet_frames, signed_distance
 from expert.geometry.pose import Array, rotation, to_world
 from expert.problems.cage import Arrangement
 from expert.world.shape import Shape
+from expert.world.walls import segments
 from tests.support.polygons import random_polygon
 
 SIZE = 0.1
@@ -24,7 +25,7 @@ def random_arrangement(rng: np.random.Generator) -> Arrangement:
         shape=Shape(vertices=vertices),
         pose=pose,
         fingers=to_world(pose, fingers),
-        walls=to_world(pose, walls.reshape(-1, 2)).reshape(-1, 2, 2),
+        walls=segments(to_world(pose, walls.reshape(-1, 2))),
     )
 
 
@@ -92,7 +93,7 @@ def transformed(a: Arrangement, rng: np.random.Generator) -> Arrangement:
         shape=Shape(vertices=scale * a.shape.vertices @ mirror),
         pose=np.append(moved(a.pose[:2]), sign * a.pose[2] + turn),
         fingers=moved(a.fingers),
-        walls=moved(a.walls),
+        walls=segments(moved(a.wall_ends)),
     )
 
 

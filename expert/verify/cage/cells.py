@@ -94,7 +94,7 @@ class CellComplex:
         self._grid = GRID if on_grid else None
         self.frame = Frame.of(arrangement.shape, arrangement.pose)
         self.fingers = self.frame.relative(arrangement.fingers)
-        self.walls = self.frame.relative(arrangement.walls)
+        self.walls = self.frame.relative(arrangement.wall_ends)
         self._vertices = arrangement.shape.vertices
         self._erosion = INNER_MARGIN + slack / self.frame.radius
         self.box = window or self._far_box()

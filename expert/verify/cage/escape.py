@@ -35,7 +35,7 @@ def escape_fault(arrangement: Arrangement, path: Array) -> str | None:
     for k, (a, b) in enumerate(itertools.pairwise(path)):
         if abs(b[2] - a[2]) > 3.0:
             return f"move {k} turns by more than 3 rad"
-        if move_collides(a, b, core_edges(core), arrangement.fingers, arrangement.walls):
+        if move_collides(a, b, core_edges(core), arrangement.fingers, arrangement.wall_ends):
             return f"move {k} collides"
     if not is_free_forever(arrangement, path[-1]):
         return "its end is still among the obstacles"
@@ -51,13 +51,13 @@ def core_edges(core: shapely.Geometry) -> Array:
 
 def _overlap(arrangement: Arrangement, core: shapely.Geometry, pose: Array) -> bool:
     points = shapely.points(to_body(pose, arrangement.fingers))
-    segments = [shapely.LineString(to_body(pose, ends)) for ends in arrangement.walls]
+    segments = [shapely.LineString(to_body(pose, ends)) for ends in arrangement.wall_ends]
     return bool(shapely.intersects(core, np.array([*points, *segments])).any())
 
 
 def is_free_forever(arrangement: Arrangement, pose: Array) -> bool:
     """Whether a line separates the object from all obstacles: it can then be moved to infinity."""
-    obstacles = np.concatenate([arrangement.fingers, arrangement.walls.reshape(-1, 2)])
+    obstacles = np.concatenate([arrangement.fingers, arrangement.wall_ends.reshape(-1, 2)])
     body = shapely.MultiPoint(to_world(pose, arrangement.shape.vertices)).convex_hull
     return bool(body.disjoint(shapely.MultiPoint(obstacles).convex_hull))
 

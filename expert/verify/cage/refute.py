@@ -20,12 +20,12 @@ def random_escape(arrangement: Arrangement, rng: np.random.Generator, *, nodes: 
     centre = np.array(shapely.MultiPoint(shape.vertices).convex_hull.centroid.coords[0])
     radius = float(np.linalg.norm(shape.vertices - centre, axis=1).max())
     start = np.append(to_world(arrangement.pose, centre[None])[0], arrangement.pose[2])
-    obstacles = np.concatenate([arrangement.fingers, arrangement.walls.reshape(-1, 2)])
+    obstacles = np.concatenate([arrangement.fingers, arrangement.wall_ends.reshape(-1, 2)])
     middle = obstacles.mean(axis=0)
     reach = radius * 1.001 + float(np.linalg.norm(obstacles - middle, axis=1).max())
     draws = rng.random((6 * nodes, 7))
     edges = core_edges(core) - centre
-    walls = np.array(arrangement.walls)
+    walls = arrangement.wall_ends
     tree, parents, count = _grow(
         start, edges, np.array(arrangement.fingers), walls, middle, reach, radius, nodes, draws
     )

@@ -91,7 +91,7 @@ def test_the_drawn_loop_stays_in_obstacles_and_winds_once_around_the_start() -> 
     arrangement = task.arrangement(answer.fingers)
     loop = enclosing_loop(arrangement, answer)
     forbidden = shapely.union_all(
-        obstacles_at(arrangement.shape, arrangement.fingers, arrangement.walls, 0.5)
+        obstacles_at(arrangement.shape, arrangement.fingers, arrangement.wall_ends, 0.5)
     ).buffer(1e-9)
     assert forbidden.covers(shapely.LineString(loop))
     angles = np.unwrap(np.arctan2(*(loop - arrangement.pose[:2]).T[::-1]))

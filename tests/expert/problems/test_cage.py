@@ -100,7 +100,7 @@ def test_bad_input_is_one_line_that_names_the_field(data: dict[str, Any], compla
 def test_files_of_both_forms_are_read() -> None:
     given = problem_of(stated(walls=[{"from": [-1, 3], "to": [2, 3]}], pose=[0.1, 0, 0.1])).task
     assert isinstance(given, Arrangement)
-    assert given.walls.shape == (1, 2, 2)
+    assert given.wall_ends.shape == (1, 2, 2)
     sought = problem_of({**search(fixed=[[3, 3]]), "options": {"rotation": [15, [5, 20]]}}).task
     assert isinstance(sought, CageProblem)
     assert np.degrees(sought.rotation) == pytest.approx(np.array([[15, 15], [5, 20]]))

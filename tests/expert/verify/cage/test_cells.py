@@ -12,6 +12,7 @@ from expert.verify.cage.cells import Cell, CellComplex, inner_piece, outer_piece
 from expert.world.frame import Frame
 from expert.world.named import named_shape
 from expert.world.shape import Shape
+from expert.world.walls import segments
 
 
 def convex(rng: np.random.Generator) -> Array:
@@ -64,7 +65,7 @@ def test_components_enclose_and_are_enclosed_by_the_free_space(width: int) -> No
     fingers = np.array([[-0.03, 0.0], [0.03, 0.01], [0.0, 0.06]])
     walls = np.array([[[-0.1, -0.09], [0.1, -0.08]]])
     arrangement = Arrangement(
-        shape=Shape(vertices=named_shape("T")), pose=np.zeros(3), fingers=fingers, walls=walls
+        shape=Shape(vertices=named_shape("T")), pose=np.zeros(3), fingers=fingers, walls=segments(walls)
     )
     complex_, frame = CellComplex(arrangement), Frame.of(arrangement.shape, arrangement.pose)
     cell = Cell(37 * width, width)
@@ -108,7 +109,7 @@ def test_a_window_shows_the_same_free_space_and_what_leaves_it_is_unbounded(seed
 def is_free(arrangement: Arrangement, pose: Array) -> bool:
     polygon = shapely.Polygon(arrangement.shape.vertices)
     points = shapely.points(to_body(pose, arrangement.fingers))
-    walls = [shapely.LineString(to_body(pose, ends)) for ends in arrangement.walls]
+    walls = [shapely.LineString(to_body(pose, ends)) for ends in arrangement.wall_ends]
     return not shapely.intersects(polygon, [*points, *walls]).any()
 
 

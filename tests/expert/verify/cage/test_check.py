@@ -11,6 +11,7 @@ from expert.verify.cage.escape import escape_fault
 from expert.verify.cage.refute import random_escape
 from expert.world.named import named_shape
 from expert.world.shape import Shape
+from expert.world.walls import segments
 from tests.support.arrangements import random_arrangement, transformed, with_finger
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -21,7 +22,7 @@ def among(vertices: Array, fingers: object, *, pose: object = (0, 0, 0), walls: 
         shape=Shape(vertices=vertices),
         pose=np.array(pose, dtype=float),
         fingers=np.array(fingers, dtype=float),
-        walls=np.reshape(walls, (-1, 2, 2)),
+        walls=segments(walls),
     )
 
 
@@ -143,7 +144,7 @@ def test_verdicts_contradict_neither_a_refuter_nor_themselves(seed: int) -> None
 
 def sampled_depth(arrangement: Arrangement, path: Array) -> float:
     """Largest depth [m] of a finger or wall at the poses of a path."""
-    obstacles = [*shapely.points(arrangement.fingers), *shapely.linestrings(arrangement.walls)]
+    obstacles = [*shapely.points(arrangement.fingers), *shapely.linestrings(arrangement.wall_ends)]
     depth = 0.0
     for pose in path:
         polygon = shapely.Polygon(to_world(pose, arrangement.shape.vertices))

@@ -9,6 +9,7 @@ from expert.geometry.pose import Array, rotation
 from expert.problems.cage import Arrangement
 from expert.verify.cage.escape import arc_meets_segment, escape_fault, segments_meet
 from expert.world.shape import Shape
+from expert.world.walls import segments
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 NONE = np.empty((0, 2, 2))
@@ -19,7 +20,7 @@ def arrangement(fingers: object, walls: object = NONE) -> Arrangement:
         shape=Shape(vertices=SQUARE),
         pose=np.zeros(3),
         fingers=np.array(fingers, dtype=float),
-        walls=np.array(walls, dtype=float),
+        walls=segments(walls),
     )
 
 
