@@ -17,6 +17,7 @@ setup: .venv/installed
 	$(BIN)/pip install --quiet --upgrade pip
 	$(BIN)/pip install --quiet torch==2.13.0
 	$(BIN)/pip install --quiet --editable '.[dev]'
+	$(BIN)/pip install --quiet --no-deps gym-pusht==0.1.8
 	touch $@
 
 demo: setup
