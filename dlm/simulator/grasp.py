@@ -14,7 +14,7 @@ from dlm.simulator.rollout import advance, motion_for
 from dlm.simulator.scene import Scene, SceneBatch
 from dlm.simulator.settings import SimulatorSettings
 from dlm.simulator.step import work_for
-from expert.geometry.pose import Array, rotation
+from expert.geometry.pose import Array, moved_origin
 from expert.problems.grasp import GraspProblem
 from expert.world.environment import Environment
 from expert.world.motion import Trajectory
@@ -53,12 +53,12 @@ def replay_grasp(
     batch = SceneBatch.of([scene])
     row, work = view(batch.arrays, 0), work_for(path.shape[1], batch.arrays.walls.shape[1])
     poses = np.empty((len(starts), len(path), 3))
-    for m, start in enumerate(_shifted(readonly(starts, (None, 3), "starts"), centroid)):
+    for m, start in enumerate(moved_origin(readonly(starts, (None, 3), "starts"), centroid)):
         motion = motion_for(len(commands), path.shape[1])
         motion.poses[0], motion.fingers[0], motion.velocities[0] = start, commands[0], 0
         advance(row, slow.settings.physics, commands, 0, motion, work)
         poses[m] = motion.poses[:: slow.substeps]
-    return _shifted(poses, -centroid)
+    return moved_origin(poses, -centroid)
 
 
 def replay_grasp_in_mujoco(
@@ -69,16 +69,16 @@ def replay_grasp_in_mujoco(
     scene, centroid = _scene(problem, len(path), friction, slow)
     commands = _commands(readonly(path, (None, None, 2), "path"), slow.substeps)
     text = command_model(
-        scene, commands, commands[0], slow.settings, start=_shifted(np.asarray(start), centroid)
+        scene, commands, commands[0], slow.settings, start=moved_origin(np.asarray(start), centroid)
     )
     record: MujocoReplay = replay_model(text)
-    return _shifted(record.poses, -centroid)
+    return moved_origin(record.poses, -centroid)
 
 
 def _scene(problem: GraspProblem, knots: int, friction: float, slow: Slow) -> tuple[Scene, Array]:
     """The object on its support plane, and the centre of mass in the body frame of the problem."""
     body, centroid = Body.uniform(problem.shape.vertices, MASS)
-    goal = _shifted(problem.pose, centroid)
+    goal = moved_origin(problem.pose, centroid)
     scene = Scene(
         body=body,
         environment=Environment(plane="transverse", support_friction=SUPPORT_FRICTION),
@@ -95,9 +95,3 @@ def _commands(path: Array, substeps: int) -> Array:
     k = np.minimum(s.astype(int), len(path) - 2)
     share = (s - k)[:, None, None]
     return np.ascontiguousarray((1 - share) * path[k] + share * path[k + 1])
-
-
-def _shifted(poses: Array, offset: Array) -> Array:
-    """Poses (..., 3) of a frame whose origin is `offset` in the body frame."""
-    origin = poses[..., :2] + (rotation(poses[..., 2]) @ offset)
-    return np.concatenate([origin, poses[..., 2:]], axis=-1)

@@ -7,7 +7,7 @@ import numpy as np
 
 from datasets.motions import Tasks
 from dlm.perception import Perceived
-from expert.geometry.pose import Array, to_world
+from expert.geometry.pose import Array, moved_origin, to_world
 from expert.problems.contact import ContactTask
 from expert.world.motion import Trajectory
 from expert.world.shape import Body
@@ -38,7 +38,7 @@ class Planning:
         steps = self.tasks.steps
         require(len(poses) == steps, "poses", f"{steps}", len(poses), f"resample the video to {steps} frames")
         body, centroid = Body.uniform(vertices, self.tasks.mass)
-        centred = np.column_stack([to_world(poses, centroid[None])[:, 0], poses[:, 2]])
+        centred = moved_origin(poses, centroid)
         depth = -to_world(centred, body.vertices)[..., 1].min(axis=1)
         centred[:, 1] += np.maximum(depth, 0.0)
         return self.tasks.task(body, Trajectory.of(centred, self.tasks.dt, "rest"))

@@ -13,7 +13,7 @@ from expert.errors import InvalidProblem
 from expert.files.contact_plan import answer_fields, read_answer
 from expert.files.fields import SMALLEST, Section, shorten
 from expert.geometry.polygon import mass_properties, simple_polygon
-from expert.geometry.pose import Array, to_world
+from expert.geometry.pose import Array, moved_origin
 from expert.problems.contact import ContactTask, Cost, Robustness
 from expert.world.environment import Environment
 from expert.world.fingers import Fingers
@@ -94,21 +94,16 @@ def _read_wall(section: Section) -> HalfPlane:
 
 def _read_trajectory(section: Section, com: Array) -> Trajectory:
     """Poses of the centre of mass; the end rule applies to its motion."""
-    poses = _moved_origin(section.array("poses", (None, 3)), com)
+    poses = moved_origin(section.array("poses", (None, 3)), com)
     if len(poses) < 2:
         raise InvalidProblem(section.path("poses"), expected="at least 2 poses", got=f"{len(poses)}")
     ends = section.choice("ends", ("steady", "rest"), "steady")
     by_rule = Trajectory.of(poses.tolist(), section.number("dt", positive=True), ends)
     outside = {
-        key: _moved_origin(section.array(key, (3,)), com) if key in section else getattr(by_rule, key)
+        key: moved_origin(section.array(key, (3,)), com) if key in section else getattr(by_rule, key)
         for key in ("before", "after")
     }
     return Trajectory(dt=by_rule.dt, poses=by_rule.poses, **outside)
-
-
-def _moved_origin(poses: Array, com: Array) -> Array:
-    """Poses (..., 3) of the file's body frame as poses of the parallel frame at the centre of mass."""
-    return np.concatenate([to_world(poses, com[None])[..., 0, :], poses[..., 2:]], axis=-1)
 
 
 def _read_fingers(file: Section, default_force: float) -> Fingers:

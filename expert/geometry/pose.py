@@ -29,6 +29,12 @@ def to_body(pose: ArrayLike, points_w: ArrayLike) -> Array:
     return (np.asarray(points_w) - pose[..., None, :2]) @ rotation(pose[..., 2])
 
 
+def moved_origin(poses: ArrayLike, point_b: ArrayLike) -> Array:
+    """Poses (..., 3) of a body frame as those of the parallel frame whose origin is its point (2,) [m]."""
+    poses = np.asarray(poses, dtype=float)
+    return np.concatenate([to_world(poses, np.asarray(point_b)[None])[..., 0, :], poses[..., 2:]], axis=-1)
+
+
 def cross(u: ArrayLike, v: ArrayLike) -> Array:
     """Planar cross product u_x v_y - u_y v_x over the last axis."""
     u, v = np.asarray(u, dtype=float), np.asarray(v, dtype=float)

@@ -15,8 +15,9 @@ import numpy as np
 
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import facet_frames, facets, mass_properties, reflex_vertices
-from expert.geometry.pose import Array, rotation
+from expert.geometry.pose import Array
 from expert.grasping.sweep_kernel import REACH, sweep_all
+from expert.world.frame import Frame
 from expert.world.shape import Shape
 from expert.world.values import readonly, require
 
@@ -77,42 +78,34 @@ def sweep(
     goal = np.zeros(3) if goal is None else readonly(goal, (3,), "goal")
     require(len(path) >= 2, "path", "at least 2 knots", len(path))
     require(0 < step <= REACH / 4, "step", f"a length over the diameter of at most {REACH / 4:g}", step)
-    frame = _Frame(shape, goal)
-    rows = frame.facet_rows()
-    half = frame.metric_root(metric)
+    lengths = _Lengths(shape, goal)
+    frame = lengths.frame
     times = np.linspace(0, len(path) - 1, (len(path) - 1) * samples + 1)
-    poses, stalled = sweep_all(rows, frame.points(path), frame.poses(starts), times, half, frame.radius, step)
+    poses, stalled = sweep_all(
+        lengths.facet_rows(),
+        np.ascontiguousarray(frame.relative(path)),
+        frame.configuration(starts),
+        times,
+        lengths.metric_root(metric),
+        lengths.radius,
+        step,
+    )
     if (inside := np.flatnonzero(stalled < 0)).size:
         raise InvalidProblem(
             f"starts[{inside[0]}]", expected="a pose that no finger enters", got="one with a finger inside"
         )
-    return Sweep(s=times, poses=frame.world(poses), stalled=stalled)
+    return Sweep(s=times, poses=frame.world_pose(poses), stalled=stalled)
 
 
-class _Frame:
+class _Lengths:
     """Lengths over the diameter; origin at the centroid of the object in its goal pose, whose angle counts as 0."""
 
     def __init__(self, shape: Shape, goal: Array) -> None:
-        self.size, self.goal = shape.size, goal
         plate = mass_properties(shape.vertices)
-        self.centroid = plate.centroid
-        self.vertices = (shape.vertices - plate.centroid) / self.size
-        self.gyration = np.sqrt(plate.second_moment / plate.area) / self.size
+        self.frame = Frame(plate.centroid, shape.size, goal)
+        self.vertices = self.frame.body(shape.vertices)
+        self.gyration = np.sqrt(plate.second_moment / plate.area) / shape.size
         self.radius = float(np.linalg.norm(self.vertices, axis=1).max())
-        self.turn = rotation(goal[2])
-        self.origin = goal[:2] + self.turn @ plate.centroid
-
-    def points(self, points: Array) -> Array:
-        return np.ascontiguousarray((points - self.origin) @ self.turn / self.size)
-
-    def poses(self, poses: Array) -> Array:
-        centres = poses[:, :2] + (rotation(poses[:, 2]) @ self.centroid)
-        return np.column_stack([self.points(centres), poses[:, 2] - self.goal[2]])
-
-    def world(self, poses: Array) -> Array:
-        angle = poses[..., 2] + self.goal[2]
-        centres = self.origin + self.size * poses[..., :2] @ self.turn.T
-        return np.concatenate([centres - rotation(angle) @ self.centroid, angle[..., None]], axis=-1)
 
     def facet_rows(self) -> Array:
         """(V, 8): start, outward normal, tangent, length, 1 where the start vertex is reflex."""

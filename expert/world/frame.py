@@ -1,19 +1,17 @@
-"""Similarity between the world and the relative lengths in which cages are computed."""
+"""Similarity between the world and the relative lengths in which cages, grasps and executions are computed."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
-from expert.geometry.pose import Array, rotation, to_world
+from expert.geometry.pose import Array, moved_origin, rotation, to_world
 from expert.world.shape import Shape
 
 
 @dataclass(frozen=True)
 class Frame:
-    """The object's reference point (centre of its enclosing circle) is its origin, the circle's radius [m] is 1, and the
-    start pose is the origin of configuration space.
-    """
+    """A reference point of the object is the origin, a radius [m] is 1, and a pose is the origin of configuration space."""
 
     centre: Array
     radius: float
@@ -21,7 +19,7 @@ class Frame:
 
     @classmethod
     def of(cls, shape: Shape, pose: Array) -> "Frame":
-        """Frame of a shape at its start pose (3,)."""
+        """Frame of a shape at its start pose (3,) by its enclosing circle: reference point and radius are the circle's."""
         circle = shapely.minimum_bounding_circle(shapely.MultiPoint(shape.vertices))
         centre = np.array(circle.centroid.coords[0])
         return cls(centre, float(np.linalg.norm(shape.vertices - centre, axis=1).max()), pose)
@@ -45,6 +43,12 @@ class Frame:
 
     def world_pose(self, configuration: Array) -> Array:
         """Body poses (..., 3) [m, rad] of relative configurations (..., 3)."""
-        angle = self.pose[2] + configuration[..., 2]
-        origin = self.world(configuration[..., :2]) - self.centre @ np.swapaxes(rotation(angle), -1, -2)
-        return np.concatenate([origin, angle[..., None]], axis=-1)
+        angle = self.pose[2] + configuration[..., 2:]
+        return moved_origin(
+            np.concatenate([self.world(configuration[..., :2]), angle], axis=-1), -self.centre
+        )
+
+    def configuration(self, pose: Array) -> Array:
+        """Relative configurations (..., 3) of body poses (..., 3) [m, rad]."""
+        moved = moved_origin(pose, self.centre)
+        return np.concatenate([self.relative(moved[..., :2]), moved[..., 2:] - self.pose[2]], axis=-1)

@@ -69,10 +69,8 @@ class FingerPath:
 
     def configurations(self, poses: Array) -> Array:
         """Relative configurations (M, 3), within half a turn of the goal, of world poses (M, 3)."""
-        poses = np.reshape(poses, (-1, 3))
-        middle = poses[:, :2] + (rotation(poses[:, 2]) @ self.frame.centre)
-        turn = wrapped(poses[:, 2] - self.pose[2])
-        return np.column_stack([self.frame.relative(middle), turn])
+        q = self.frame.configuration(np.reshape(poses, (-1, 3)))
+        return np.column_stack([q[:, :2], wrapped(q[:, 2])])
 
     def gap(self, configurations: Array, s: float) -> Array:
         """Distance (M,) of the nearest finger from the object at configurations (M, 3); negative: inside."""

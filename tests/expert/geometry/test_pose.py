@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from expert.geometry.pose import Array, cross, perpendicular, rotation, to_body, to_world
+from expert.geometry.pose import Array, cross, moved_origin, perpendicular, rotation, to_body, to_world
 
 COORDINATE = st.floats(-10, 10)
 POSE = st.tuples(COORDINATE, COORDINATE, st.floats(-7, 7)).map(np.array)
@@ -52,3 +52,10 @@ def test_poses_and_points_broadcast() -> None:
 def test_cross_product_is_the_product_with_the_perpendicular(u: Array, v: Array) -> None:
     np.testing.assert_allclose(cross(u, v), perpendicular(u) @ v, atol=1e-12)
     np.testing.assert_allclose(cross(u, v), -cross(v, u), atol=1e-12)
+
+
+@given(POSE, VECTOR, POINTS)
+def test_a_moved_origin_leaves_the_body_where_it_is(pose: Array, origin: Array, points: Array) -> None:
+    moved = moved_origin(pose, origin)
+    np.testing.assert_allclose(to_world(moved, points - origin), to_world(pose, points), atol=1e-12)
+    np.testing.assert_allclose(moved_origin(moved, -origin), pose, atol=1e-12)
