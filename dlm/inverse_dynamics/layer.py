@@ -35,7 +35,7 @@ class Action:
 
 
 class InverseDynamics(nn.Module):
-    """The quadratic program 4-CT6 as a layer; docs/inverse-dynamics.md derives it.
+    """The quadratic program 4-CT6 as a layer; docs/theory/inverse-dynamics.md derives it.
 
     size: numbers of steps, fingers, region rows and ground contacts.  dt [s] and cost: the expert's.
     torque: first_order, (p_ref - r) x lambda + (p - p_ref) x lambda_ref, or thesis, (p_ref - r) x lambda.

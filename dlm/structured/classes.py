@@ -26,7 +26,7 @@ MEASURED = (
     "xx... xxxxx",
     "...xx xxxx.",
 )
-"""Schedules of five steps and two fingers by falling share of the expert's labels; docs/structured.md has the shares."""
+"""Schedules of five steps and two fingers by falling share of the expert's labels; docs/theory/structured.md has the shares."""
 
 
 @dataclass(frozen=True)

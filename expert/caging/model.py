@@ -8,7 +8,7 @@ y             points that fill the loop at L and at U, one for each triangle of 
 
 Why a solution is a cage: the loop of overlapping pieces exists at every orientation of [L, U] and moves continuously, it
 winds once around the start, and at L and U it can be contracted inside the obstacles, so the free component of the start
-cannot reach either end, nor cross the loop in between (docs/caging.md).
+cannot reach either end, nor cross the loop in between (docs/theory/caging.md).
 """
 
 from collections.abc import Sequence

@@ -8,7 +8,7 @@ inner shape   a convex piece {y : n_k . y <= d_k} shrinks to {R(+-h) n_k . y <= 
               {n_k . y <= d_k cos h}: the points that stay inside the piece while it turns by up to h either way;
 outer shape   the hull of R(+-h) v and v / cos h over the corners v: every arc of a corner, hence the turning piece.
 
-`docs/caging.md` proves both.  Obstacles made of inner shapes leave too much free space, those of outer shapes too little.
+`docs/theory/caging.md` proves both.  Obstacles made of inner shapes leave too much free space, those of outer shapes too little.
 """
 
 from dataclasses import dataclass
