@@ -51,7 +51,7 @@ class Variables:
 
 
 def inverse_dynamics_problem(size: QPSize, weights: QPWeights) -> tuple[cp.Problem, Parameters, Variables]:
-    """4-CT6, its parameters by the names of QPData, and its variables."""
+    """QP (4-CT6), which is ID (4-CT1, 4-CT2) made convex: the problem, its parameters by the names of QPData, its variables."""
     x = Variables.of(size)
     P = {name: cp.Parameter(shape, name=name) for name, shape in size.shapes.items()}
     constraints = [
@@ -106,7 +106,7 @@ def free_regions(x: Variables, P: Parameters) -> list[cp.Constraint]:
 
 
 def cost(x: Variables, P: Parameters, w: QPWeights) -> cp.Expression:
-    """|Lambda|^2_Q + |p_ddot|^2_Q + q |eps|_1, the price of flags below 1, and what makes the optimum unique."""
+    """|Lambda|^2_Q + |p_ddot|^2_Q (4-CT1) + q |eps|_1, the price of flags below 1, and what makes the optimum unique."""
     squares = [
         (w.force, x.lam),
         (w.acceleration, x.p[2:] - 2 * x.p[1:-1] + x.p[:-2]),

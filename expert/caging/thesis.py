@@ -36,7 +36,7 @@ def slices(below: float, above: float, count: int) -> Array:
 
 
 def blocks(x: Variables, o: SlicedObject) -> list[Block]:
-    """The "subject to" list of MIP1."""
+    """The "subject to" list of MIP1 (Thesis 5-MIP1)."""
     return [
         intersections(x, o),  # 5-CT1
         one_intersection(x),  # 5-CT2

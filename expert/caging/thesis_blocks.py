@@ -106,6 +106,7 @@ def loop_closure(x: Variables, o: SlicedObject) -> Block:
     """5-CT3, 5-CT4: wherever the loop comes to a piece it goes on, within the finger or to the next, once.
 
     G says which meetings inside a finger the loop uses, and only pieces that meet may: a point of both joins them.
+    With 5-CT1 and 5-CT2 the obstacles then hold an enclosing loop (5.1 Definition 2).
     """
     entered, used = x.entered(), x.used()
     leaves = cp.sum(x.H, axis=2) + cp.sum(x.G, axis=2)
@@ -121,8 +122,9 @@ def object_enclosing(x: Variables, o: SlicedObject) -> Block:
     """5-CT5: q is below, above, left or right of each segment of the loop, and the ray up from q crosses it once, leftward, more
     often than rightward: winding number one.
 
-    Mended: of an odd count the printed truth table makes an even one; and boxes about straight segments between two
-    meetings leave out every cage of a convex object by three fingers, so that the way through a piece may bend once.
+    What lies inside is caged under translations (5.1 Remark 1).  Mended: of an odd count (5.1 Remark 2, 5.1 Lemma 1) the
+    printed truth table makes an even one; and boxes about straight segments between two meetings leave out every cage of
+    a convex object by three fingers, so that the way through a piece may bend once.
     """
     a, b = x.way[:, :, :2], x.way[:, :, 1:]
     used = cp.broadcast_to(x.used()[..., None], (*x.F.shape[:3],))
@@ -154,8 +156,8 @@ def non_penetration(x: Variables, o: SlicedObject) -> Block:
 def limits(x: Variables, o: SlicedObject) -> Block:
     """5-CT7: between the limits, and at them, each finger is in a region and the loop exists; beyond, nothing is asked.
 
-    Mended: as printed, Theta = 1 switches the loop off at the limit slices themselves.  sum_ij H = 1 is 5-CT2: one
-    topology for all slices, which Theorem 1 needs and 5-CT11 does not give.
+    The limits are those of 5.1 Definition 1.  Mended: as printed, Theta = 1 switches the loop off at the limit slices
+    themselves.  sum_ij H = 1 is 5-CT2: one topology for all slices, which 5.1 Theorem 1 needs and 5-CT11 does not give.
     """
     up, down = x.Theta[o.start :], x.Theta[o.start :: -1]
     N = x.p.shape[0]
@@ -197,8 +199,10 @@ def limit_contacts(x: Variables, o: SlicedObject) -> Block:
 
 
 def continuous_boundary(x: Variables, o: SlicedObject) -> Block:
-    """5-CT9 to 5-CT11: between neighbouring slices a point x fixed in P_j,n+1 stays in P_i,n: its arc there lies in the triangle of
-    its ends and of x_v, where their tangents meet.
+    """5-CT9, 5-CT10, 5-CT11: between neighbouring slices a point x fixed in P_j,n+1 stays in P_i,n: its arc there lies in the
+    triangle of its ends and of x_v, where their tangents meet.
+
+    So the loop encloses between the slices too: 5.1 Theorem 1, whose proof is 5.1 Lemma 2, 5.1 Lemma 3 and 5.1 Lemma 4.
     """
     Delta = x.p - _ahead(x.p)
     half = np.diff(o.angles) / 2

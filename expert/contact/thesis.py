@@ -71,7 +71,7 @@ def cost(x: Variables, s: ScaledTask) -> cp.Expression:
 
 
 def blocks(x: Variables, s: ScaledTask, task: ContactTask, segments: int) -> list[Block]:
-    """The "subject to" list of MIQP1."""
+    """The "subject to" list of MIQP1 (Thesis 3-MIQP1)."""
     mu = task.fingers.friction
     program = [
         linear_dynamics(x, s),  # 3-CT1

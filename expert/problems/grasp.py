@@ -20,7 +20,7 @@ GraspCost = Literal["attraction", "acceleration"]
 
 @dataclass(frozen=True, kw_only=True)
 class GraspProblem:
-    """Which finger paths bring every nearby start of the object to the goal pose (3,)? (Thesis 5.2)
+    """Which finger paths bring every nearby start of the object to the goal pose (3,)? (Thesis 5.2 Problem 1)
 
     half_ranges (K,) [rad], strictly decreasing: knot k keeps the object within +-half_ranges[k] of the goal orientation.
     cost: `attraction` makes the set of starts large, `acceleration` the finger paths smooth.

@@ -45,6 +45,8 @@ class DeadEndEvent:
 def dead_end_events(path: FingerPath) -> list[DeadEndEvent]:
     """All dead ends along a finger path but the goal itself, reachable or not, in order of s.
 
+    Nested cages may contain some, in which starts get stuck: what 5.2 Remark 1 overlooks.
+
     Raises SolverFailed where there are more than can be listed.
     """
     contacts, rows = _closing(path)

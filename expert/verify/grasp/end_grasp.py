@@ -118,7 +118,10 @@ def _positively_span(normals: Array) -> bool:
 
 
 def observability_rank(gradients: Array) -> int:
-    """Rank of the proprioceptive sensor model (Thesis 5.2.4) with gap gradients (C, 3).
+    """Rank of the proprioceptive sensor model (5.2 Definition 1) with gap gradients (C, 3).
+
+    Rank 3: the grasp is observable (5.2 Definition 2, 5.2 Remark 3), which is first-order form closure (5.2 Remark 4,
+    5.2 Corollary 1).
 
     Sensor i answers to first order with g_i . dq where that is negative (the gap closes), and with 0 otherwise.  Motions
     without any answer form the cone g_i . dq >= 0; the rank is 3 less the dimension that it spans.  That is the rank of

@@ -13,7 +13,7 @@ Verdict = Literal["certified", "refuted", "unknown"]
 
 @dataclass(frozen=True, kw_only=True)
 class Cages:
-    """Nested cages: the thesis's conditions (5-CT12..15), whatever the dead ends say.
+    """Nested cages: the thesis's conditions (5-CT12 to 5-CT15, 5.2 Remark 2), whatever the dead ends say.
 
     half_ranges (K,), knot_ranges (K, 2) [rad]: what was asked for, and the orientations relative to the goal that can be
     reached at each knot, from outside; nan: not shown to be caged.  samples (M, 2), ranges (M, 2): parameters of the
