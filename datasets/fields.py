@@ -1,13 +1,13 @@
 """The fields of a stored sample: names, types, axes, and the way from a Sample to arrays and back."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from datasets.motions import Tasks
-from datasets.parameters import EXTERNAL_CONTACTS, MechanicalParameters
+from datasets.motions import TaskSettings
+from datasets.parameters import EXTERNAL_CONTACTS, SCHEMA, MechanicalParameters
 from datasets.specification import Sample
 from expert.errors import InvalidProblem
 from expert.problems.contact import ContactForce, Plan
@@ -18,7 +18,7 @@ NO_VERTEX = -1
 """Vertex of an absent floor contact."""
 
 PARAMETER = "parameter_"
-"""Prefix of the fields that hold P(t); see MechanicalParameters for their meaning."""
+"""Prefix of the fields that hold P(t)."""
 
 
 @dataclass(frozen=True)
@@ -47,24 +47,6 @@ AXES = {
     "b": "least, largest",
 }
 
-PARAMETERS = {
-    "poses": Field("f", "ntp", "motion r(t) of the centre of mass [m, m, rad]"),
-    "wrench": Field("f", "ntw", "M r_ddot + G, what all contacts together exert [N, N, N m]"),
-    "facets": Field("f", "ntcjd", "segment open to the finger [m]"),
-    "cones": Field("f", "ntcjd", "edges of its friction cone, unit normal component"),
-    "contact": Field("f", "ntc", "1 where the finger touches"),
-    "stick": Field("f", "ntc", "1 where it stays at its place to the next step, and so may push"),
-    "force_limits": Field("f", "ntcb", "normal force of a pushing finger [N]"),
-    "region_normals": Field("f", "ntchd", "half-planes A p <= b that a free finger keeps to: A"),
-    "region_offsets": Field("f", "ntch", "and b [m]"),
-    "external_contact": Field("f", "nte", "1 where the object touches the floor"),
-    "external_points": Field("f", "nted", "where [m]"),
-    "external_cones": Field("f", "ntejd", "rays of the floor's forces, unit normal component"),
-    "reference_positions": Field("f", "ntcd", "where the torque is linearised: positions [m]"),
-    "reference_forces": Field("f", "ntcd", "and forces [N]"),
-}
-"""P(t) (Thesis 4-CT4); MechanicalParameters says more."""
-
 FIELDS = {
     "index": Field("i", "n", "number of the task"),
     "attempt": Field("i", "n", "draws that failed before it"),
@@ -92,8 +74,8 @@ FIELDS = {
     "nodes": Field("i", "n", "nodes of the search"),
     "residual": Field("f", "n", "largest Newton-Euler residual over m g and m g L"),
     **{
-        PARAMETER + name: Field(field.kind, field.axes, f"P(t): {field.meaning}")
-        for name, field in PARAMETERS.items()
+        PARAMETER + name: Field("f", f"nt{q.axes}", f"P(t): {q.meaning}" + (f" [{q.unit}]" if q.unit else ""))
+        for name, q in SCHEMA.items()
     },
 }
 
@@ -130,7 +112,7 @@ def _row(sample: Sample, most_vertices: int) -> dict[str, Any]:
         "bound": plan.bound,
         "nodes": plan.nodes,
         "residual": plan.residual,
-        **{PARAMETER + f.name: getattr(sample.parameters, f.name) for f in fields(MechanicalParameters)},
+        **{PARAMETER + name: value for name, value in sample.parameters.named().items()},
     }
 
 
@@ -146,7 +128,7 @@ def _floor(plan: Plan, steps: int) -> dict[str, Any]:
     return {"floor_vertices": vertices, "floor_points": points, "floor_forces": forces}
 
 
-def sample_of(row: Mapping[str, Any], tasks: Tasks) -> Sample:
+def sample_of(row: Mapping[str, Any], tasks: TaskSettings) -> Sample:
     """The sample that `_row` was made of; `tasks` holds what all tasks of the data set share.
 
     Raises InvalidProblem where the stored numbers make no task.
@@ -171,9 +153,7 @@ def sample_of(row: Mapping[str, Any], tasks: Tasks) -> Sample:
         video=row["video"],
         task=own.task(body, motion),
         plan=_plan(row),
-        parameters=MechanicalParameters(
-            **{f.name: row[PARAMETER + f.name] for f in fields(MechanicalParameters)}
-        ),
+        parameters=MechanicalParameters(**{name: row[PARAMETER + name] for name in SCHEMA}),
     )
 
 

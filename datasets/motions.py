@@ -188,7 +188,7 @@ def _is_aloft(heights: Array, phase: Phase) -> bool:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tasks:
+class TaskSettings:
     """What is common to the tasks of a data set.  SI units; friction for fingers and floor alike.
 
     steps T and dt [s]: the video's frames.  force_limit: largest normal force of a finger over m g.  facet_margin,
@@ -252,14 +252,21 @@ class Tasks:
         )
 
 
+Tasks = TaskSettings
+"""The name under which checkpoints know them."""
+
+
 def sample_task(
-    rng: np.random.Generator, family: str, shapes: ShapeFamily | None = None, tasks: Tasks | None = None
+    rng: np.random.Generator,
+    family: str,
+    shapes: ShapeFamily | None = None,
+    tasks: TaskSettings | None = None,
 ) -> ContactTask:
     """A random object and a random motion of `family`; the body frame is parallel to the world's at the first pose.
 
     Vertex 0 is the left end of the line on which the object rests.  Raises InvalidProblem as its parts do.
     """
-    shapes, tasks = shapes or Shapes(), tasks or Tasks()
+    shapes, tasks = shapes or Shapes(), tasks or TaskSettings()
     body, _ = Body.uniform(shapes.sample(rng), tasks.mass)
     motion = sample_motion(rng, body, family, steps=tasks.steps, dt=tasks.dt)
     return tasks.task(*upright(body, motion))

@@ -1,7 +1,8 @@
 """Mechanical parameters P(t) of a task (Thesis 4-CT4): all that the inverse dynamics must know to find the expert's plan."""
 
 import itertools
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Annotated, Generic, TypeVar
 
 import numpy as np
 
@@ -12,44 +13,83 @@ from expert.mechanics import ExternalContact, external_contacts, friction_rays, 
 from expert.problems.contact import FREE, ContactTask, Plan
 from expert.world.values import IntArray, require
 
+T = TypeVar("T")
+
 EXTERNAL_CONTACTS = 2
 REGION_ROWS = 4
 NO_ROW = 1.0
 """Offset [m] of an empty region row, 0 . p <= 1: never active."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class MechanicalParameters:
-    """P(t) of one task, SI, world frame; t step, c finger, e external contact, h region row, j end point, k ray, d coordinate.
+@dataclass(frozen=True)
+class Quantity:
+    """What one field of P is at a step.
 
-    poses (t, 3)             r, of the centre of mass.
-    wrench (t, 3)            M r_ddot + G, what all contacts together must exert about the centre of mass [N, N, N m].
-    facets (t, c, j, d)      segment open to a touching finger: the facet less margin and wall clearance; the same fractions
-                             over one contact interval.  A free finger keeps its nearest interval's facet (moving with the object).
-    cones (t, c, k, d)       rays of unit normal component, tightened as the expert's.
-    contact (t, c)           1 where the finger touches its facet.
-    stick (t, c)             1 where it keeps its place to the next step (to the end, at the last): only then may it push.
-    force_limits (t, c, 2)   least and largest normal force of a pushing finger [N].
-    region_normals (t, c, h, d), region_offsets (t, c, h)   free fingers: A p <= b; empty rows are 0 . p <= 1.
-    external_contact (t, e), external_points (t, e, d), external_cones (t, e, k, d)   ground contacts: 1 where there is one, where,
-                             and its cone; both rays of a sliding contact are the same, fillers are zero rays at the centre of mass.
-    reference_positions, reference_forces (t, c, d)         where the torque is linearised: the expert's plan.
+    axes: one letter each: c finger, e external contact, h region row, j end point or ray, d x and y, p pose, w wrench,
+    b least and largest.  unit: of all numbers, or one for each entry of the last axis.  flag: 0 or 1; what a network predicts may
+    be anything between.  where: the field without which this one is a filler: a flag that is 0, or rows of zeros.
     """
 
-    poses: Array
-    wrench: Array
-    facets: Array
-    cones: Array
-    contact: Array
-    stick: Array
-    force_limits: Array
-    region_normals: Array
-    region_offsets: Array
-    external_contact: Array
-    external_points: Array
-    external_cones: Array
-    reference_positions: Array
-    reference_forces: Array
+    axes: str
+    meaning: str
+    unit: str = ""
+    flag: bool = False
+    where: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(Generic[T]):
+    """P(t) (Thesis 4-CT4), SI, world frame: the one statement of its fields, in the order that everybody uses.
+
+    Arrays begin with a step axis t, batches of tensors with task and step.  Facets less margin and wall clearance have the same
+    fractions over one contact interval; a free finger keeps its nearest interval's facet, which moves with the object.  Cones are
+    tightened as the expert's; both rays of a sliding ground contact are the same.  Fillers: empty region rows are 0 . p <= 1,
+    absent ground contacts zero rays at the centre of mass.
+    """
+
+    poses: Annotated[T, Quantity("p", "motion r(t) of the centre of mass", "m, m, rad")]
+    wrench: Annotated[T, Quantity("w", "M r_ddot + G, what all contacts together exert", "N, N, N m")]
+    facets: Annotated[T, Quantity("cjd", "segment open to the finger", "m", where="contact")]
+    cones: Annotated[T, Quantity("cjd", "edges of its friction cone, unit normal component", where="contact")]
+    contact: Annotated[T, Quantity("c", "1 where the finger touches", flag=True)]
+    stick: Annotated[
+        T, Quantity("c", "1 where it stays at its place to the next step, and so may push", flag=True)
+    ]
+    force_limits: Annotated[T, Quantity("cb", "normal force of a pushing finger", "N")]
+    region_normals: Annotated[
+        T, Quantity("chd", "half-planes A p <= b that a free finger keeps to: A", where="region_normals")
+    ]
+    region_offsets: Annotated[T, Quantity("ch", "and b", "m", where="region_normals")]
+    external_contact: Annotated[T, Quantity("e", "1 where the object touches the floor", flag=True)]
+    external_points: Annotated[T, Quantity("ed", "where", "m", where="external_contact")]
+    external_cones: Annotated[
+        T, Quantity("ejd", "rays of the floor's forces, unit normal component", where="external_contact")
+    ]
+    reference_positions: Annotated[T, Quantity("cd", "where the torque is linearised: positions", "m")]
+    reference_forces: Annotated[T, Quantity("cd", "and forces", "N")]
+
+    def named(self) -> dict[str, T]:
+        """All fields by name, in their order."""
+        return {name: getattr(self, name) for name in SCHEMA}
+
+
+SCHEMA: dict[str, Quantity] = {
+    name: kind.__metadata__[0] for name, kind in Parameters.__annotations__.items()
+}
+"""Every field of P by name."""
+
+
+def field_shapes(
+    fingers: int, rows: int = REGION_ROWS, external: int = EXTERNAL_CONTACTS
+) -> dict[str, tuple[int, ...]]:
+    """Shape of each field at one step."""
+    sizes = {"c": fingers, "h": rows, "e": external, "p": 3, "w": 3, "j": 2, "d": 2, "b": 2}
+    return {name: tuple(sizes[axis] for axis in q.axes) for name, q in SCHEMA.items()}
+
+
+@dataclass(frozen=True, kw_only=True)
+class MechanicalParameters(Parameters[Array]):
+    """P(t) of one task, as read-only arrays (t, ...).  Raises InvalidProblem for other shapes, and for nan or inf."""
 
     def __post_init__(self) -> None:
         steps, fingers = np.shape(self.contact)
@@ -60,32 +100,6 @@ class MechanicalParameters:
             require(bool(np.isfinite(value).all()), name, "finite numbers", "nan or inf")
             value.setflags(write=False)
             object.__setattr__(self, name, value)
-
-    def arrays(self) -> dict[str, Array]:
-        """All fields by name."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
-
-
-def field_shapes(
-    fingers: int, rows: int = REGION_ROWS, external: int = EXTERNAL_CONTACTS
-) -> dict[str, tuple[int, ...]]:
-    """Shape of each field at one step, in the one order that everybody uses."""
-    return {
-        "poses": (3,),
-        "wrench": (3,),
-        "facets": (fingers, 2, 2),
-        "cones": (fingers, 2, 2),
-        "contact": (fingers,),
-        "stick": (fingers,),
-        "force_limits": (fingers, 2),
-        "region_normals": (fingers, rows, 2),
-        "region_offsets": (fingers, rows),
-        "external_contact": (external,),
-        "external_points": (external, 2),
-        "external_cones": (external, 2, 2),
-        "reference_positions": (fingers, 2),
-        "reference_forces": (fingers, 2),
-    }
 
 
 def parameters_of(task: ContactTask, plan: Plan, *, rows: int = REGION_ROWS) -> MechanicalParameters:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from datasets.label import Labelling, Refusal, label
-from datasets.motions import FAMILIES, NoRoom, Tasks, sample_task
+from datasets.motions import FAMILIES, NoRoom, TaskSettings, sample_task
 from datasets.parameters import MechanicalParameters, parameters_of
 from datasets.render import Camera, Frames, Palette, render
 from datasets.shapes import ShapeFamily, Shapes
@@ -30,7 +30,7 @@ class Specification:
     count: int
     shard: int = 4
     shapes: ShapeFamily = field(default_factory=Shapes)
-    tasks: Tasks = field(default_factory=Tasks)
+    tasks: TaskSettings = field(default_factory=TaskSettings)
     camera: Camera = field(default_factory=Camera)
     palette: Palette = field(default_factory=Palette)
     labelling: Labelling = field(default_factory=Labelling)

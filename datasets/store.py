@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from datasets.fields import FIELDS, arrays_of, sample_of
-from datasets.motions import Tasks
+from datasets.motions import TaskSettings
 from datasets.specification import FailedDraw, Sample, Specification
 from expert.errors import InvalidProblem
 
@@ -183,7 +183,7 @@ class DataSet:
 
     def __getitem__(self, i: int) -> Sample:
         """Sample i with its task, plan and parameters rebuilt."""
-        tasks = Tasks(**self.manifest["settings"]["tasks"])
+        tasks = TaskSettings(**self.manifest["settings"]["tasks"])
         return sample_of({name: array[i] for name, array in self.arrays.items()}, tasks)
 
     @property

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 import shapely
 
-from datasets.motions import Tasks
+from datasets.motions import TaskSettings
 from dlm.infer.clip import Clip, read_clip
 from dlm.infer.segmentation import Segmentation
 from dlm.infer.view import View, find_floor, lowest_row, view_of
@@ -204,7 +204,7 @@ def resampled(seen: Perceived, clip: Clip, steps: int) -> Perceived:
     return replace(seen, poses=np.column_stack(columns))
 
 
-def tasks_of(tasks: Tasks, scene: Scene, clip: Clip) -> Tasks:
+def tasks_of(tasks: TaskSettings, scene: Scene, clip: Clip) -> TaskSettings:
     """What planning assumes, with this scene's mass, friction and pace."""
     duration = clip.duration if scene.duration is None else scene.duration
     return replace(tasks, mass=scene.mass, friction=scene.friction, dt=duration / (tasks.steps - 1))

@@ -1,6 +1,7 @@
 """The numbers of the quadratic program 4-CT6, without dimensions, from mechanical parameters in SI units."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Annotated
 
 import torch
 from torch import Tensor
@@ -26,64 +27,49 @@ class QPSize:
     def shapes(self) -> dict[str, tuple[int, ...]]:
         """Shape of each field of QPData, without its batch axis."""
         t, c, h, e = self.steps, self.fingers, self.rows, self.external
-        return {
-            "wrench": (t, 3),
-            "arm": (t, c, 2),
-            "couple": (t, c, 2),
-            "anchor": (t, c, 2),
-            "offset": (t,),
-            "rays": (t, c, 2, 2),
-            "ground_rays": (t, e, 2, 2),
-            "ground_torque": (t, e, 2),
-            "start": (t, c, 2),
-            "edge": (t, c, 2),
-            "contact": (t, c),
-            "free": (t, c),
-            "idle": (t, c),
-            "absent": (t, e),
-            "sticks": (t - 1, c),
-            "slips": (t - 1, c),
-            "least": (t, c),
-            "most": (t, c),
-            "normals": (t, c, h, 2),
-            "bounds": (t, c, h),
-        }
+        sizes = {"t": t, "s": t - 1, "c": c, "h": h, "e": e, "w": 3, "k": 2, "d": 2}
+        return {name: tuple(sizes[axis] for axis in axes) for name, axes in QP_AXES.items()}
 
 
 @dataclass(frozen=True, kw_only=True)
 class QPData:
     """Parameters of one batch of programs; lengths over L, forces over F, torques over F L.
 
+    Axes after the batch's: t step, s from a step to the next, c finger, e ground contact, h region row, k ray, d x and y, w wrench.
     wrench: what all contacts exert.  arm, couple, anchor, offset: p_ref - r, lambda_ref, p_ref, sum_c p_ref x lambda_ref.
     rays: of the fingers; zero where one must not push.  ground_rays, ground_torque: of the ground; zero without contact.
     start, edge: facets start + rho edge.  contact, free = 1 - contact, idle = 1 - stick, sticks, slips = 1 - sticks, absent: flags.
     least, most: normal forces.  normals, bounds: regions A p <= b.
     """
 
-    wrench: Tensor
-    arm: Tensor
-    couple: Tensor
-    anchor: Tensor
-    offset: Tensor
-    rays: Tensor
-    ground_rays: Tensor
-    ground_torque: Tensor
-    start: Tensor
-    edge: Tensor
-    contact: Tensor
-    free: Tensor
-    idle: Tensor
-    absent: Tensor
-    sticks: Tensor
-    slips: Tensor
-    least: Tensor
-    most: Tensor
-    normals: Tensor
-    bounds: Tensor
+    wrench: Annotated[Tensor, "tw"]
+    arm: Annotated[Tensor, "tcd"]
+    couple: Annotated[Tensor, "tcd"]
+    anchor: Annotated[Tensor, "tcd"]
+    offset: Annotated[Tensor, "t"]
+    rays: Annotated[Tensor, "tckd"]
+    ground_rays: Annotated[Tensor, "tekd"]
+    ground_torque: Annotated[Tensor, "tek"]
+    start: Annotated[Tensor, "tcd"]
+    edge: Annotated[Tensor, "tcd"]
+    contact: Annotated[Tensor, "tc"]
+    free: Annotated[Tensor, "tc"]
+    idle: Annotated[Tensor, "tc"]
+    absent: Annotated[Tensor, "te"]
+    sticks: Annotated[Tensor, "sc"]
+    slips: Annotated[Tensor, "sc"]
+    least: Annotated[Tensor, "tc"]
+    most: Annotated[Tensor, "tc"]
+    normals: Annotated[Tensor, "tchd"]
+    bounds: Annotated[Tensor, "tch"]
 
     def tensors(self) -> dict[str, Tensor]:
         """All fields by name, in the order of `QPSize.shapes`."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        return {name: getattr(self, name) for name in QP_AXES}
+
+
+QP_AXES: dict[str, str] = {name: kind.__metadata__[0] for name, kind in QPData.__annotations__.items()}
+"""Axes of every field, without the batch axis."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -110,7 +110,7 @@ class Program(nn.Module):
 
 def finite_rows(parameters: ParameterBatch) -> Tensor:
     """Mask (b,) of the tasks whose parameters are all finite."""
-    return torch.stack([x.isfinite().flatten(1).all(1) for x in parameters.tensors().values()]).all(0)
+    return torch.stack([x.isfinite().flatten(1).all(1) for x in parameters.named().values()]).all(0)
 
 
 def _like(mask: Tensor, x: Tensor) -> Tensor:

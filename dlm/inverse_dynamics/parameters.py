@@ -1,46 +1,35 @@
 """Batched mechanical parameters P(t) as torch tensors, and the one flattening that networks, losses and stores use."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import prod
 
 import torch
 from torch import Tensor
 
-from datasets.parameters import EXTERNAL_CONTACTS, REGION_ROWS, MechanicalParameters, field_shapes
+from datasets.parameters import (
+    EXTERNAL_CONTACTS,
+    REGION_ROWS,
+    SCHEMA,
+    MechanicalParameters,
+    Parameters,
+    field_shapes,
+)
 from expert.world.values import require
 
-FLAGS = ("contact", "stick", "external_contact")
+FLAGS = tuple(name for name, quantity in SCHEMA.items() if quantity.flag)
 
 
 @dataclass(frozen=True, kw_only=True)
-class ParameterBatch:
-    """P(t) of a batch of tasks: the fields of `datasets.parameters.MechanicalParameters` with a leading batch axis.
-
-    Shapes (b, t, ...), SI units, world frame.  The FLAGS may take any value from 0 to 1.
-    """
-
-    poses: Tensor
-    wrench: Tensor
-    facets: Tensor
-    cones: Tensor
-    contact: Tensor
-    stick: Tensor
-    force_limits: Tensor
-    region_normals: Tensor
-    region_offsets: Tensor
-    external_contact: Tensor
-    external_points: Tensor
-    external_cones: Tensor
-    reference_positions: Tensor
-    reference_forces: Tensor
+class ParameterBatch(Parameters[Tensor]):
+    """P(t) of a batch of tasks, (b, t, ...).  The FLAGS may take any value from 0 to 1."""
 
     def __post_init__(self) -> None:
         batch = self.contact.shape[:2]
         fingers, rows = self.region_offsets.shape[2:]
         shapes = field_shapes(fingers, rows, self.external_points.shape[2])
-        for name, value in self.tensors().items():
+        for name, value in self.named().items():
             wanted = (*batch, *shapes[name])
             require(tuple(value.shape) == wanted, name, f"shape {wanted}", tuple(value.shape))
 
@@ -50,16 +39,12 @@ class ParameterBatch:
     ) -> "ParameterBatch":
         """Batch of single tasks with the same numbers of steps, fingers, rows and external contacts."""
         require(len(tasks) > 0, "tasks", "at least one task", len(tasks))
-        columns = {n: [p.arrays()[n] for p in tasks] for n in tasks[0].arrays()}
+        columns = {n: [p.named()[n] for p in tasks] for n in SCHEMA}
         return cls(**{n: torch.stack([torch.tensor(a, dtype=dtype) for a in v]) for n, v in columns.items()})
-
-    def tensors(self) -> dict[str, Tensor]:
-        """All fields by name, in the order of the flattening."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
 
     def map(self, function: Callable[[Tensor], Tensor]) -> "ParameterBatch":
         """The same function on every field, for instance `.map(Tensor.detach)` or `.map(lambda x: x[mask])`."""
-        return replace(self, **{name: function(value) for name, value in self.tensors().items()})
+        return replace(self, **{name: function(value) for name, value in self.named().items()})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,22 +73,13 @@ class Layout:
     @cached_property
     def scales(self) -> dict[str, Tensor]:
         """Physical scale of each field, broadcastable to its shape."""
-        l, f = self.length, self.force
-        scale = {
-            "poses": [l, l, 1.0],
-            "wrench": [f, f, 0.1 * f * l],
-            "facets": [l],
-            "force_limits": [f],
-            "region_offsets": [l],
-            "external_points": [l],
-            "reference_positions": [l],
-            "reference_forces": [f],
-        }
-        return {name: torch.tensor(scale.get(name, [1.0]), dtype=torch.float64) for name in self.shapes}
+        units = {"m": self.length, "N": self.force, "N m": 0.1 * self.force * self.length}
+        scale = {name: [units.get(u, 1.0) for u in q.unit.split(", ")] for name, q in SCHEMA.items()}
+        return {name: torch.tensor(numbers, dtype=torch.float64) for name, numbers in scale.items()}
 
     def flatten(self, parameters: ParameterBatch) -> Tensor:
         """(b, t, width), every number divided by its scale."""
-        columns = [self._scaled(n, v, down=True).flatten(2) for n, v in parameters.tensors().items()]
+        columns = [self._scaled(n, v, down=True).flatten(2) for n, v in parameters.named().items()]
         return torch.cat(columns, dim=-1)
 
     def unflatten(self, flat: Tensor) -> ParameterBatch:
@@ -127,20 +103,19 @@ class Layout:
 
     def relevance(self, target: ParameterBatch) -> Tensor:
         """Weights (b, t, width), 1 where a number of the target means something and 0 where it is a filler."""
-        meaningful = {
-            "facets": target.contact[..., None, None],
-            "cones": target.contact[..., None, None],
-            "region_normals": (target.region_normals != 0).any(-1, keepdim=True),
-            "region_offsets": (target.region_normals != 0).any(-1),
-            "external_points": target.external_contact[..., None],
-            "external_cones": target.external_contact[..., None, None],
-        }
-        columns = []
-        for name, value in target.tensors().items():
-            weight = meaningful.get(name, torch.ones_like(value)).to(value.dtype)
-            columns.append(weight.expand_as(value).flatten(2))
+        columns = [_meaningful(target, n).expand_as(v).flatten(2) for n, v in target.named().items()]
         return torch.cat(columns, dim=-1)
 
     def _scaled(self, name: str, value: Tensor, *, down: bool) -> Tensor:
         scale = self.scales[name].to(value)
         return value / scale if down else value * scale
+
+
+def _meaningful(target: ParameterBatch, name: str) -> Tensor:
+    """1 where a field of the target means something, 0 where it is a filler; broadcastable to the field."""
+    value, where = target.named()[name], SCHEMA[name].where
+    if not where:
+        return torch.ones_like(value)
+    given = target.named()[where]
+    mark = given if SCHEMA[where].flag else (given != 0).any(-1)
+    return mark.to(value.dtype).view(*mark.shape, *[1] * (value.dim() - mark.dim()))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from datasets.motions import Tasks
+from datasets.motions import TaskSettings
 
 LENGTH = 0.05
 SHORT = 0.01
@@ -42,7 +42,7 @@ class Geometry:
         return self.vertices.gather(1, index[..., None].expand(-1, -1, 2))
 
 
-def facet_tokens(g: Geometry, tasks: Tasks) -> Tensor:
+def facet_tokens(g: Geometry, tasks: TaskSettings) -> Tensor:
     """(b, f, t * FACET_NUMBERS + 1): end points, normal, heights and the range of rho open to a finger, by step; length."""
     a, b = turned(g.vertices, g.poses), turned(g.ends, g.poses)  # (b, t, f, 2)
     along = b - a
@@ -55,7 +55,7 @@ def facet_tokens(g: Geometry, tasks: Tasks) -> Tensor:
     return torch.cat([by_step, length[:, 0] / LENGTH], -1).float()
 
 
-def open_range(heights: Tensor, tasks: Tasks) -> tuple[Tensor, Tensor]:
+def open_range(heights: Tensor, tasks: TaskSettings) -> tuple[Tensor, Tensor]:
     """Least and greatest rho that the facet margin and the floor's clearance leave, of facets with end points this high."""
     start = heights[..., 0] - tasks.clearance
     slope = heights[..., 1] - heights[..., 0]
@@ -67,7 +67,7 @@ def open_range(heights: Tensor, tasks: Tasks) -> tuple[Tensor, Tensor]:
     return low.clamp(margin, 2.0), torch.where(closed, -1.0, high.clamp(-1.0, 1 - margin))
 
 
-def step_tokens(g: Geometry, tasks: Tasks) -> Tensor:
+def step_tokens(g: Geometry, tasks: TaskSettings) -> Tensor:
     """(b, t, STEP_NUMBERS): pose since the start and to the next step, wrench to be exerted, contact with the floor."""
     later = torch.cat([g.poses[:, 1:], g.poses[:, -1:]], 1)
     earlier = torch.cat([g.poses[:, :1], g.poses[:, :-1]], 1)
@@ -81,7 +81,7 @@ def step_tokens(g: Geometry, tasks: Tasks) -> Tensor:
     return torch.cat(numbers, -1).float()
 
 
-def _wrench(g: Geometry, acceleration: Tensor, tasks: Tasks) -> Tensor:
+def _wrench(g: Geometry, acceleration: Tensor, tasks: TaskSettings) -> Tensor:
     """Over m g and m g LENGTH, of a uniform plate."""
     linear = acceleration[..., :2] / tasks.gravity + acceleration.new_tensor([0.0, 1.0])
     torque = gyration(g)[:, None] * acceleration[..., 2] / (tasks.gravity * LENGTH)

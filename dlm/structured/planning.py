@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from datasets.motions import Tasks
+from datasets.motions import TaskSettings
 from dlm.perception import Perceived
 from expert.geometry.pose import Array, moved_origin, to_world
 from expert.problems.contact import ContactTask
@@ -28,7 +28,7 @@ class Planning:
     tasks: mass, friction, time step, fingers and margins; its facet_margin, cone_fraction and least_push are those planned with.
     """
 
-    tasks: Tasks = field(default_factory=lambda: Tasks(facet_margin=FACET_MARGIN))
+    tasks: TaskSettings = field(default_factory=lambda: TaskSettings(facet_margin=FACET_MARGIN))
 
     def task(self, vertices: Array, poses: Array) -> ContactTask:
         """The task of moving a uniform object, vertices (V, 2) about its centroid, along poses (T, 3) over the floor y = 0.

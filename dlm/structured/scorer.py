@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from datasets.motions import Tasks
+from datasets.motions import TaskSettings
 from dlm.structured.classes import Schedules
 from dlm.structured.features import FACET_NUMBERS, STEP_NUMBERS, Geometry, facet_tokens, step_tokens
 from expert.geometry.pose import Array
@@ -41,7 +41,7 @@ class Encoder(nn.Module):
             layer, layers, norm=nn.LayerNorm(width), enable_nested_tensor=False
         )
 
-    def forward(self, g: Geometry, tasks: Tasks) -> tuple[Tensor, Tensor]:
+    def forward(self, g: Geometry, tasks: TaskSettings) -> tuple[Tensor, Tensor]:
         facets = self.facet(facet_tokens(g, tasks))
         steps = self.step(step_tokens(g, tasks)) + self.clock
         absent = torch.cat([~g.present, torch.zeros(steps.shape[:2], dtype=torch.bool)], 1)
@@ -60,14 +60,14 @@ class Scorer(nn.Module):
         self,
         schedules: Schedules,
         *,
-        tasks: Tasks | None = None,
+        tasks: TaskSettings | None = None,
         steps: int = 5,
         width: int = 96,
         layers: int = 3,
         heads: int = 4,
     ) -> None:
         super().__init__()
-        self.schedules, self.tasks = schedules, tasks or Tasks()
+        self.schedules, self.tasks = schedules, tasks or TaskSettings()
         self.encoder = Encoder(steps=steps, width=width, layers=layers, heads=heads)
         self.first, self.second, self.whole = (nn.Linear(width, width) for _ in range(3))
         self.pair = nn.Sequential(

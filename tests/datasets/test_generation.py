@@ -17,7 +17,7 @@ import pytest
 
 from datasets.generation import Generation, generate
 from datasets.label import Labelling, Refusal, label
-from datasets.motions import FAMILIES, Tasks, sample_task
+from datasets.motions import FAMILIES, TaskSettings, sample_task
 from datasets.shapes import Shapes
 from datasets.specification import FailedDraw, Specification, draw, generator
 from datasets.store import encode_shard, read_dataset, read_manifest, shard_path
@@ -190,7 +190,9 @@ def test_a_task_that_no_draw_can_label_stops_the_job(smoke: Specification) -> No
 
 
 def test_a_spent_budget_is_no_proof_of_infeasibility() -> None:
-    task = sample_task(np.random.default_rng(0), "slide_lift", Shapes(facets=(12, 12)), Tasks(least_push=0.0))
+    task = sample_task(
+        np.random.default_rng(0), "slide_lift", Shapes(facets=(12, 12)), TaskSettings(least_push=0.0)
+    )
     answer = label(task, Labelling(node_limit=1, gap=1e-9))
     reason = answer.reason if isinstance(answer, Refusal) else answer.plan.status
     assert reason in ("budget", "feasible")

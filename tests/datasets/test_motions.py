@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from datasets.motions import FAMILIES, Phase, Tasks, poses_of, sample_motion, sample_task, timed
+from datasets.motions import FAMILIES, Phase, TaskSettings, poses_of, sample_motion, sample_task, timed
 from datasets.render import Camera
 from datasets.shapes import Shapes
 from expert.errors import InvalidProblem
@@ -131,7 +131,7 @@ def test_a_body_in_any_frame_can_be_given() -> None:
 
 
 def test_tasks_carry_the_margins_that_let_plans_survive() -> None:
-    task = sample_task(np.random.default_rng(0), "lift", tasks=Tasks(facet_margin=0.2))
+    task = sample_task(np.random.default_rng(0), "lift", tasks=TaskSettings(facet_margin=0.2))
     weight = 0.1 * 9.81
     assert task.fingers.max_force == pytest.approx(10 * weight)
     assert task.fingers.facet_margin == 0.2

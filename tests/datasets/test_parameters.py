@@ -131,7 +131,7 @@ def test_regions_of_too_many_half_planes_are_refused() -> None:
 
 
 def test_p_checks_its_arrays(P: MechanicalParameters) -> None:
-    assert {n: a.shape[1:] for n, a in P.arrays().items()} == field_shapes(2)
+    assert {n: a.shape[1:] for n, a in P.named().items()} == field_shapes(2)
     with pytest.raises(InvalidProblem, match="cones: expected finite numbers"):
         replace(P, cones=np.full_like(P.cones, np.nan))
     with pytest.raises(InvalidProblem, match="wrench: expected shape"):

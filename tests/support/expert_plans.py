@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from datasets.label import Label, Labelling, label
-from datasets.motions import FAMILIES, Tasks, sample_task
+from datasets.motions import FAMILIES, TaskSettings, sample_task
 from datasets.shapes import Shapes, sample_polygon
 from expert.errors import InvalidProblem
 from expert.problems.contact import ContactTask, Plan
@@ -25,7 +25,7 @@ class Planned:
 
 def planned_tasks(count: int, facets: tuple[int, int], seed: int) -> tuple[list[Planned], int]:
     """So many labelled sagittal tasks, the families in turn, and the number of draws that had no plan."""
-    shapes, tasks = Shapes(facets=facets), Tasks()
+    shapes, tasks = Shapes(facets=facets), TaskSettings()
     found: list[Planned] = []
     draws = 0
     while len(found) < count:
@@ -45,7 +45,7 @@ def transverse_tasks(count: int, seed: int) -> tuple[list[Planned], int]:
     """So many labelled tasks on a table: 1 to 3 cm in some direction, turning by up to 0.3 rad."""
     found: list[Planned] = []
     draws = 0
-    template = Tasks()
+    template = TaskSettings()
     while len(found) < count:
         rng = np.random.default_rng([seed, draws])
         draws += 1

@@ -28,8 +28,8 @@ def test_flatten_inverts_unflatten(
 
 def test_unflatten_inverts_flatten(batch: ParameterBatch) -> None:
     again = LAYOUT.unflatten(LAYOUT.flatten(batch))
-    for name, value in batch.tensors().items():
-        torch.testing.assert_close(again.tensors()[name], value)
+    for name, value in batch.named().items():
+        torch.testing.assert_close(again.named()[name], value)
 
 
 def test_each_number_has_one_column() -> None:
@@ -79,11 +79,11 @@ def test_bad_batches_are_refused(batch: ParameterBatch) -> None:
     with pytest.raises(InvalidProblem, match="tasks: expected at least one task"):
         ParameterBatch.stack([])
     with pytest.raises(InvalidProblem, match="cones: expected shape"):
-        ParameterBatch(**{**batch.tensors(), "cones": batch.cones[:, :, :1]})
+        ParameterBatch(**{**batch.named(), "cones": batch.cones[:, :, :1]})
     with pytest.raises(InvalidProblem, match="flat: expected"):
         LAYOUT.unflatten(torch.zeros(1, 5, LAYOUT.width + 1))
 
 
 def test_map_acts_on_every_field(batch: ParameterBatch) -> None:
     half = batch.map(lambda value: value[:3])
-    assert all(len(value) == 3 for value in half.tensors().values())
+    assert all(len(value) == 3 for value in half.named().values())

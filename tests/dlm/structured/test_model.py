@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from datasets.motions import Tasks
+from datasets.motions import TaskSettings
 from dlm.evaluation.outcomes import act, execute
 from dlm.metrics import object_trajectory_loss
 from dlm.perception import Perceived
@@ -62,7 +62,7 @@ def test_parameters_of_a_plan_are_those_of_4_ct4(tasks: TaskBatch) -> None:
 
 
 def test_what_cannot_be_done_is_said_and_not_planned(tasks: TaskBatch) -> None:
-    weak = Tasks(facet_margin=0.2, force_limit=0.1)
+    weak = TaskSettings(facet_margin=0.2, force_limit=0.1)
     k = next(i for i, s in enumerate(tasks.samples) if "lift" in s.family)
     planned = StructuredModel(planning=Planning(tasks=weak)).plan(seen_by_label(tasks, k))
     assert planned.status == "no_plan"

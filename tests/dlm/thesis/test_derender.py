@@ -39,7 +39,7 @@ def test_an_untrained_derenderer_is_centred_on_the_mean_task(tasks: TaskBatch) -
         nn.init.zeros_(head[-1].weight)
         nn.init.zeros_(head[-1].bias)
     guess = derenderer.parameters_of(tasks.video)
-    for name, value in tasks.parameters.tensors().items():
+    for name, value in tasks.parameters.named().items():
         mean = value.mean(0).expand_as(value)
         tolerance = 0.021 if name in FLAGS else 1e-5  # flags keep off 0 and 1
         torch.testing.assert_close(getattr(guess, name), mean, atol=tolerance, rtol=1e-5)
