@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from dlm.inverse_dynamics.layer import Action, InverseDynamics
 from dlm.tasks import TaskBatch
 
-Kind = Literal["perceptron", "program", "regressor", "best_guess", "proposals"]
+PolicyKind = Literal["perceptron", "program", "regressor", "best_guess", "proposals"]
 """The first two belong to `model: thesis`, the others to `model: structured`."""
 
 
@@ -31,13 +31,13 @@ class Policy(nn.Module):
 Loss = Callable[[Policy, TaskBatch], Tensor]
 
 
-class Model(Protocol):
+class Architecture(Protocol):
     """What a configuration's `model` is: its name, and how to build its policies with weights drawn from a seed."""
 
     @property
     def name(self) -> str: ...
 
-    def build(self, kind: Kind, program: InverseDynamics, *, seed: int) -> Policy: ...
+    def build(self, kind: PolicyKind, program: InverseDynamics, *, seed: int) -> Policy: ...
 
 
 @contextmanager

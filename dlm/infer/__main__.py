@@ -11,8 +11,9 @@ from omegaconf import DictConfig
 from rich.console import Console
 
 from datasets.entry import entry_point
+from dlm.infer.clip import VideoFile
 from dlm.infer.drawing import draw_inference
-from dlm.infer.inference import Inference, Scene, infer
+from dlm.infer.inference import Given, Inference, infer
 from dlm.infer.segmentation import Segmentation
 from dlm.structured import StructuredModel
 from dlm.structured.weights import SHIPPED, trained_model
@@ -35,8 +36,8 @@ def main(cfg: DictConfig) -> None:
     require(not folder.exists() or folder.is_dir(), "out", "a folder", f"{folder}, a file")
     with Console(stderr=True).status("perceiving and planning") as status:
         answer = infer(
-            cfg.video,
-            Scene(**{field.name: cfg[field.name] for field in fields(Scene)}),
+            VideoFile(path=cfg.video, start=cfg.start, end=cfg.end, rate=cfg.rate),
+            Given(**{field.name: cfg[field.name] for field in fields(Given)}),
             segmentation=Segmentation(
                 colour=cfg.colour if cfg.colour is None else tuple(cfg.colour),
                 background=cfg.background,
@@ -44,9 +45,6 @@ def main(cfg: DictConfig) -> None:
             ),
             model=chosen_model(cfg.checkpoint),
             refine=cfg.refine,
-            start=cfg.start,
-            end=cfg.end,
-            rate=cfg.rate,
         )
         status.update("drawing")
         write(answer, folder)

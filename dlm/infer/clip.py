@@ -30,14 +30,26 @@ class Clip:
         return float(self.times[-1])
 
 
-def read_clip(
-    path: str | Path, *, steps: int, start: float = 0.0, end: float | None = None, rate: float | None = None
-) -> Clip:
-    """The frames of a video file nearest to `steps` equally spaced times from `start` to `end` [s], each frame once.
+@dataclass(frozen=True, kw_only=True)
+class VideoFile:
+    """A video file, or its part from `start` to `end` [s]; None: to its last frame.
 
-    rate: frames per second, where the file does not say or says wrongly.  Raises InvalidProblem for what is no video, holds
-    fewer than two frames, or not the times asked for.
+    rate: frames per second, where the file does not say or says wrongly.
     """
+
+    path: str | Path
+    start: float = 0.0
+    end: float | None = None
+    rate: float | None = None
+
+
+def read_clip(video: str | Path | VideoFile, *, steps: int) -> Clip:
+    """The frames nearest to `steps` equally spaced times, each frame once.
+
+    Raises InvalidProblem for what is no video, holds fewer than two frames, or not the times asked for.
+    """
+    file = video if isinstance(video, VideoFile) else VideoFile(path=video)
+    path, start, end, rate = file.path, file.start, file.end, file.rate
     require(Path(path).is_file(), "video", "a file", f"{path}, which is none")
     count, stated = _measure(path)
     rate = stated if rate is None else rate

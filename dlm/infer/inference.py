@@ -8,11 +8,10 @@ import numpy as np
 import shapely
 
 from datasets.motions import TaskSettings
-from dlm.infer.clip import Clip, read_clip
+from dlm.infer.clip import Clip, VideoFile, read_clip
 from dlm.infer.segmentation import Segmentation
 from dlm.infer.view import View, find_floor, lowest_row, view_of
 from dlm.perception import Perceived, PerceptionSettings, perceive
-from dlm.simulator import SimulatorSettings
 from dlm.simulator.replay import Replay, replay
 from dlm.structured import ClassPlanner, ExpertPlanner, Planned, StructuredModel
 from dlm.structured.trial import Trial
@@ -37,7 +36,7 @@ UNKNOWN_SCALE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scene:
+class Given:
     """What a video cannot say.
 
     scale: metres per pixel of the video; or object_size: greatest extent of the object [m].  floor: row of the floor's surface
@@ -114,32 +113,26 @@ class Inference:
 
 
 def infer(
-    video: str | Path | Clip,
-    scene: Scene,
+    video: str | Path | VideoFile | Clip,
+    given: Given,
     *,
     segmentation: Segmentation | None = None,
     model: StructuredModel | None = None,
     refine: Refine | None = None,
-    start: float = 0.0,
-    end: float | None = None,
-    rate: float | None = None,
-    simulator: SimulatorSettings | None = None,
 ) -> Inference:
     """Positions and forces of two point fingers that move the object of a video as the video shows.
 
-    model: how to plan; None: every contact class is checked, which needs no weights, and plans are tried out in simulation.  refine: "expert" lets the expert plan,
-    slower and over all contact sequences; without it, that happens only where the model finds no plan.  start, end [s], rate: see `read_clip`.
-    Raises InvalidProblem, one line, for a video without one object that stays in view.
+    model: how to plan; None: every contact class is checked, which needs no weights, and plans are tried out in simulation.
+    refine: "expert" lets the expert plan, slower and over all contact sequences; without it, that happens only where the model
+    finds no plan.  Raises InvalidProblem, one line, for a video without one object that stays in view.
     """
     require(refine in (None, "expert"), "refine", "expert or nothing", refine)
     model = model or StructuredModel(planner=ClassPlanner(trial=Trial()))
     model = replace(model, perception=replace(model.perception, codec=CODEC))
     steps = model.planning.tasks.steps
-    clip = (
-        video if isinstance(video, Clip) else read_clip(video, steps=steps, start=start, end=end, rate=rate)
-    )
-    view, seen = look(clip, scene, segmentation or Segmentation(), model.perception)
-    planning = replace(model.planning, tasks=tasks_of(model.planning.tasks, scene, clip))
+    clip = video if isinstance(video, Clip) else read_clip(video, steps=steps)
+    view, seen = look(clip, given, segmentation or Segmentation(), model.perception)
+    planning = replace(model.planning, tasks=tasks_of(model.planning.tasks, given, clip))
     by_model = replace(model, planning=planning)
     by_expert = replace(by_model, planner=ExpertPlanner())
     motion = resampled(seen, clip, steps)
@@ -148,19 +141,19 @@ def infer(
         planned = by_expert.plan(motion)
     result = None
     if planned.plan is not None and planned.task is not None:
-        result = replay(planned.task, planned.plan.positions, planned.plan.forces, simulator)
+        result = replay(planned.task, planned.plan.positions, planned.plan.forces)
     return Inference(clip=clip, view=view, planned=planned, result=result)
 
 
 def look(
-    clip: Clip, scene: Scene, segmentation: Segmentation, settings: PerceptionSettings
+    clip: Clip, given: Given, segmentation: Segmentation, settings: PerceptionSettings
 ) -> tuple[View, Perceived]:
     """Find floor, object and scale; perceive.  Raises InvalidProblem."""
-    floor = scene.floor if scene.floor is not None else find_floor(clip.frames)
+    floor = given.floor if given.floor is not None else find_floor(clip.frames)
     if floor is None:
         floor = lowest_row(segmentation.paint(clip.frames, float(clip.frames.shape[1])))
     frames = segmentation.paint(clip.frames, floor)
-    scale = scene.scale or UNKNOWN_SCALE
+    scale = given.scale or UNKNOWN_SCALE
     tried: list[tuple[bool, float, int, View, Perceived]] = []
     for extent in EXTENTS:
         view = view_of(frames, scale=scale, floor=floor, extent=extent)
@@ -170,9 +163,9 @@ def look(
             break
     *_, view, seen = min(tried)
     seen = simplified(seen, NEEDLESS * view.camera.scale)
-    if scene.object_size is None:
+    if given.object_size is None:
         return view, seen
-    factor = scene.object_size / diameter(seen.vertices)
+    factor = given.object_size / diameter(seen.vertices)
     return view.scaled(factor), scaled(seen, factor)
 
 
@@ -204,7 +197,7 @@ def resampled(seen: Perceived, clip: Clip, steps: int) -> Perceived:
     return replace(seen, poses=np.column_stack(columns))
 
 
-def tasks_of(tasks: TaskSettings, scene: Scene, clip: Clip) -> TaskSettings:
-    """What planning assumes, with this scene's mass, friction and pace."""
-    duration = clip.duration if scene.duration is None else scene.duration
-    return replace(tasks, mass=scene.mass, friction=scene.friction, dt=duration / (tasks.steps - 1))
+def tasks_of(tasks: TaskSettings, given: Given, clip: Clip) -> TaskSettings:
+    """What planning assumes, with the given mass, friction and pace."""
+    duration = clip.duration if given.duration is None else given.duration
+    return replace(tasks, mass=given.mass, friction=given.friction, dt=duration / (tasks.steps - 1))

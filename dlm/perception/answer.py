@@ -7,7 +7,7 @@ import shapely
 
 from datasets.render import Camera
 from dlm.perception.appearance import Appearance
-from dlm.perception.fit import Observation, Scene, modelled
+from dlm.perception.fit import MovingPolygon, Observation, modelled
 from dlm.perception.raster import is_simple
 from dlm.perception.types import Perceived, PerceptionSettings, Status
 from expert.geometry.polygon import mass_properties, signed_area
@@ -22,7 +22,7 @@ LOW = 0.1
 
 
 def answer(
-    scene: Scene, seen: Observation, look: Appearance, camera: Camera, settings: PerceptionSettings
+    scene: MovingPolygon, seen: Observation, look: Appearance, camera: Camera, settings: PerceptionSettings
 ) -> Perceived:
     """In metres, about the centroid, the lowest vertex first."""
     residual, hidden = explained(scene, seen, look)
@@ -45,7 +45,7 @@ def answer(
     )
 
 
-def explained(scene: Scene, seen: Observation, look: Appearance) -> tuple[float, float]:
+def explained(scene: MovingPolygon, seen: Observation, look: Appearance) -> tuple[float, float]:
     """Rms error of the pixels that the outline crosses [grey levels], and the share of these that are hidden."""
     share, gradient = modelled(scene, seen)
     edge = np.abs(gradient).sum(axis=(-1, -2)) > 1e-3
@@ -56,7 +56,7 @@ def explained(scene: Scene, seen: Observation, look: Appearance) -> tuple[float,
 
 
 def _verdict(
-    scene: Scene, residual: float, hidden: float, noise: float, settings: PerceptionSettings
+    scene: MovingPolygon, residual: float, hidden: float, noise: float, settings: PerceptionSettings
 ) -> tuple[Status, str]:
     allowed = settings.tolerance * noise + UNEXPLAINED
     if not is_simple(scene.vertices):
@@ -74,10 +74,10 @@ def _verdict(
     return "ok", ""
 
 
-def _hull(scene: Scene) -> Array:
+def _hull(scene: MovingPolygon) -> Array:
     """The scene with the convex hull of its vertices."""
     hull = np.array(cast(shapely.Polygon, shapely.MultiPoint(scene.vertices).convex_hull).exterior.coords)[
         :-1
     ]
     hull = hull if signed_area(hull) > 0 else hull[::-1]
-    return Scene(hull, scene.motion, scene.centre).placed()
+    return MovingPolygon(hull, scene.motion, scene.centre).placed()

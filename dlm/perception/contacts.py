@@ -4,7 +4,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dlm.perception.fit import LEAST_DAMPING, LONGEST_STEP, Observation, Quadratic, Scene, fit, quadratic
+from dlm.perception.fit import (
+    LEAST_DAMPING,
+    LONGEST_STEP,
+    MovingPolygon,
+    Observation,
+    Quadratic,
+    fit,
+    quadratic,
+)
 from dlm.perception.prune import boundary_variance, without_tangles
 from expert.geometry.pose import Array
 
@@ -31,7 +39,7 @@ class Contact:
         return SYSTEMATIC_SLIP if self.sticks else SYSTEMATIC_GAP
 
 
-def snap_contacts(scene: Scene, seen: Observation, floor: float, reach: float) -> Scene:
+def snap_contacts(scene: MovingPolygon, seen: Observation, floor: float, reach: float) -> MovingPolygon:
     """Fit again under the contacts that the data allows; nothing enters the floor Y = `floor` [pixels]."""
     for _ in range(len(scene.vertices)):
         snapped = _snapped(scene, seen, floor, reach)
@@ -48,7 +56,7 @@ def _without_straight_corners(vertices: Array, floor: float) -> Array:
     return vertices[~(down & np.roll(down, 1) & np.roll(down, -1))]
 
 
-def _snapped(scene: Scene, seen: Observation, floor: float, reach: float) -> Scene:
+def _snapped(scene: MovingPolygon, seen: Observation, floor: float, reach: float) -> MovingPolygon:
     contacts: list[Contact] = []
     for candidates in (_touching, _sticking):
         value = quadratic(scene, seen)
@@ -59,8 +67,8 @@ def _snapped(scene: Scene, seen: Observation, floor: float, reach: float) -> Sce
 
 
 def _settle(
-    scene: Scene, seen: Observation, contacts: list[Contact], floor: float, variance: float
-) -> tuple[Scene, list[Contact]]:
+    scene: MovingPolygon, seen: Observation, contacts: list[Contact], floor: float, variance: float
+) -> tuple[MovingPolygon, list[Contact]]:
     """Fit under contacts; give up, one by one, those that the data contradicts, and add what would enter the floor."""
     for _ in range(4 * scene.motion.size):
         scene, free, deviation = _fit_under(scene, seen, contacts, floor, variance)
@@ -89,8 +97,8 @@ def _rests_on(contact: Contact, lost: Contact) -> bool:
 
 
 def _fit_under(
-    scene: Scene, seen: Observation, contacts: list[Contact], floor: float, variance: float
-) -> tuple[Scene, Array, Array]:
+    scene: MovingPolygon, seen: Observation, contacts: list[Contact], floor: float, variance: float
+) -> tuple[MovingPolygon, Array, Array]:
     """Gauss-Newton under equality; with it the value each constraint would take if it alone were lifted, and its deviation."""
     for _ in range(ITERATIONS):
         values, slopes = _constraints(scene, contacts, floor)
@@ -108,7 +116,7 @@ def _fit_under(
     return scene, pull / stiffness, np.sqrt(variance / stiffness)
 
 
-def _constraints(scene: Scene, contacts: list[Contact], floor: float) -> tuple[Array, Array]:
+def _constraints(scene: MovingPolygon, contacts: list[Contact], floor: float) -> tuple[Array, Array]:
     """Gaps and slips (K,) [pixels] and their derivatives (K, n)."""
     placed, slope = scene.placed(), scene.derivative()
     values, slopes = np.zeros(len(contacts)), np.zeros((len(contacts), slope.shape[-1]))
@@ -130,21 +138,21 @@ def _covariance(value: Quadratic, variance: float) -> Array:
 
 
 def _touching(
-    scene: Scene, contacts: list[Contact], covariance: Array, floor: float, reach: float
+    scene: MovingPolygon, contacts: list[Contact], covariance: Array, floor: float, reach: float
 ) -> list[Contact]:
     every = [Contact(t, k) for t in range(len(scene.motion)) for k in range(len(scene.vertices))]
     return _insignificant(scene, every, covariance, floor, reach)
 
 
 def _sticking(
-    scene: Scene, contacts: list[Contact], covariance: Array, floor: float, reach: float
+    scene: MovingPolygon, contacts: list[Contact], covariance: Array, floor: float, reach: float
 ) -> list[Contact]:
     steady = [Contact(c.step, c.vertex, True) for c in contacts if Contact(c.step + 1, c.vertex) in contacts]
     return _insignificant(scene, steady, covariance, floor, reach)
 
 
 def _insignificant(
-    scene: Scene, contacts: list[Contact], covariance: Array, floor: float, reach: float
+    scene: MovingPolygon, contacts: list[Contact], covariance: Array, floor: float, reach: float
 ) -> list[Contact]:
     """Those whose gap or slip is small and not significant."""
     values, slopes = _constraints(scene, contacts, floor)

@@ -31,7 +31,7 @@ class Observation:
 
 
 @dataclass(frozen=True)
-class Scene:
+class MovingPolygon:
     """vertices (V, 2) at step 0 [pixels]; motion (T, 3): turn about `centre`, then shift [pixels, pixels, rad]; motion[0] = 0."""
 
     vertices: Array
@@ -42,16 +42,16 @@ class Scene:
         """Vertices at all steps, (T, V, 2) [pixels]."""
         return _place(self.vertices, self.motion, self.centre)
 
-    def moved(self, step: Array) -> "Scene":
+    def moved(self, step: Array) -> "MovingPolygon":
         """By parameters in the order of `derivative`."""
         count = self.vertices.size
         motion = self.motion.copy()
         motion[1:] += step[count:].reshape(-1, 3)
         return replace(self, vertices=self.vertices + step[:count].reshape(-1, 2), motion=motion)
 
-    def seen_from_first_step(self) -> "Scene":
+    def seen_from_first_step(self) -> "MovingPolygon":
         """The same scene, described by the vertices' places at step 0."""
-        return Scene(self.placed()[0], self.motion - self.motion[0], self.centre + self.motion[0, :2])
+        return MovingPolygon(self.placed()[0], self.motion - self.motion[0], self.centre + self.motion[0, :2])
 
     def derivative(self) -> Array:
         """Of placed vertices with respect to all parameters: vertices, then motion[1:]; (T, V, 2, 2 V + 3 (T - 1))."""
@@ -86,7 +86,7 @@ class Quadratic:
     matrix: Array
 
 
-def modelled(scene: Scene, seen: Observation) -> tuple[Array, Array]:
+def modelled(scene: MovingPolygon, seen: Observation) -> tuple[Array, Array]:
     """Coverage in the windows (T, h, w) and its gradient (T, h, w, V, 2) as the camera sees them."""
     share, gradient = coverage(scene.placed(), seen.origins, *seen.share.shape[1:])
     if seen.blur > 0:
@@ -96,21 +96,21 @@ def modelled(scene: Scene, seen: Observation) -> tuple[Array, Array]:
     return share, gradient
 
 
-def crossed(scene: Scene, seen: Observation) -> tuple[Array, NDArrayBool]:
+def crossed(scene: MovingPolygon, seen: Observation) -> tuple[Array, NDArrayBool]:
     """Weighted squares of the errors (T, h, w), and which pixels with a weight the outline crosses."""
     share, gradient = modelled(scene, seen)
     edge = (np.abs(gradient).sum(axis=(-1, -2)) > 1e-9) & (seen.weight > 0)
     return seen.weight * (share - seen.share) ** 2, edge
 
 
-def calibrated(scene: Scene, seen: Observation) -> Observation:
+def calibrated(scene: MovingPolygon, seen: Observation) -> Observation:
     """The observation with the object's colour corrected so that the scene explains it best: blur may hide a pure one."""
     share, _ = modelled(scene, seen)
     scale = float((seen.weight * share * seen.share).sum() / (seen.weight * share * share).sum())
     return replace(seen, share=seen.share / scale, weight=seen.weight * scale**2)
 
 
-def without_outliers(scene: Scene, seen: Observation) -> Observation:
+def without_outliers(scene: MovingPolygon, seen: Observation) -> Observation:
     """The observation without the pixels that the scene is far from explaining, as where something hides the object."""
     share, _ = modelled(scene, seen)
     error = np.abs(share - seen.share)
@@ -118,7 +118,7 @@ def without_outliers(scene: Scene, seen: Observation) -> Observation:
     return replace(seen, weight=np.where(far, 0.0, seen.weight))
 
 
-def quadratic(scene: Scene, seen: Observation) -> Quadratic:
+def quadratic(scene: MovingPolygon, seen: Observation) -> Quadratic:
     """The cost around a scene."""
     share, gradient = modelled(scene, seen)
     cost, slope, square = _normal_equations(share - seen.share, seen.weight, gradient)
@@ -187,13 +187,13 @@ def _chain(slope: Array, square: Array, arms: Array, angles: Array) -> tuple[Arr
 
 
 def fit(
-    scene: Scene,
+    scene: MovingPolygon,
     seen: Observation,
     *,
     iterations: int = 30,
     free: slice = slice(None),
     precision: float = 1e-5,
-) -> tuple[Scene, Quadratic]:
+) -> tuple[MovingPolygon, Quadratic]:
     """Levenberg-Marquardt over the parameters `free` (default: all), until the cost falls by less than `precision` of itself."""
     here, damping = quadratic(scene, seen), 1e-3
     for _ in range(iterations):

@@ -6,7 +6,7 @@ from datasets.render import Camera, Frames
 from dlm.perception.answer import answer
 from dlm.perception.appearance import Appearance, separate
 from dlm.perception.contacts import snap_contacts
-from dlm.perception.fit import Observation, Scene, calibrated, fit, without_outliers
+from dlm.perception.fit import MovingPolygon, Observation, calibrated, fit, without_outliers
 from dlm.perception.prune import boundary_variance, prune
 from dlm.perception.segment import MARGIN, Windows, segment
 from dlm.perception.start import clearest_frames, first_scene
@@ -40,7 +40,7 @@ def perceive(
     return answer(scene, seen, look, camera, settings)
 
 
-def _best_start(seen: Observation, settings: PerceptionSettings) -> tuple[Scene, Observation]:
+def _best_start(seen: Observation, settings: PerceptionSettings) -> tuple[MovingPolygon, Observation]:
     """Fitted from the clearest frame's outline; where that explains little, from a finer one, then from another frame."""
     first, second = (int(t) for t in clearest_frames(seen)[:2])
     fine = FINER * settings.most_vertices
@@ -56,8 +56,8 @@ def _best_start(seen: Observation, settings: PerceptionSettings) -> tuple[Scene,
 
 def _started(
     seen: Observation, reference: int, most_vertices: int, settings: PerceptionSettings
-) -> tuple[tuple[Scene, Observation], float]:
-    """Scene fitted from one frame's outline, the observation without what hides it, and the error over the noise's."""
+) -> tuple[tuple[MovingPolygon, Observation], float]:
+    """MovingPolygon fitted from one frame's outline, the observation without what hides it, and the error over the noise's."""
     scene = first_scene(seen, reference, most_vertices)
     trusted = without_outliers(scene, seen)
     for _ in range(BLURRED_PASSES if settings.blur > 0 else 1):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dlm.perception.fit import Observation, Quadratic, Scene, crossed, fit
+from dlm.perception.fit import MovingPolygon, Observation, Quadratic, crossed, fit
 from expert.geometry.polygon import crossing_edges, facets
 from expert.geometry.pose import Array, cross
 
@@ -12,7 +12,7 @@ SHORTEST = 0.6
 """No facet is shorter than this [pixels]."""
 
 
-def prune(scene: Scene, seen: Observation) -> tuple[Scene, Quadratic]:
+def prune(scene: MovingPolygon, seen: Observation) -> tuple[MovingPolygon, Quadratic]:
     """Remove corners, the least noticed first, while that pays; the scene is fitted again each time."""
     scene, best = fit(scene, seen)
     while len(scene.vertices) > 3:
@@ -52,7 +52,7 @@ def without_tangles(vertices: Array) -> Array:
     return vertices
 
 
-def boundary_variance(scene: Scene, seen: Observation) -> tuple[int, float]:
+def boundary_variance(scene: MovingPolygon, seen: Observation) -> tuple[int, float]:
     """Number of pixels that the outline crosses, and the mean weighted square of their errors (1: noise alone), at least 1."""
     squares, edge = crossed(scene, seen)
     count = int(edge.sum())
@@ -60,7 +60,7 @@ def boundary_variance(scene: Scene, seen: Observation) -> tuple[int, float]:
     return count, max(1.0, float(squares[edge].sum()) / spare)
 
 
-def straightness(scene: Scene, quadratic: Quadratic) -> Array:
+def straightness(scene: MovingPolygon, quadratic: Quadratic) -> Array:
     """What the cost would rise by if each corner lay on the line between its neighbours, to first order (V,)."""
     v = scene.vertices
     count, size = len(v), len(quadratic.gradient)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from dlm.perception.fit import Observation, Scene, crossed, fit
+from dlm.perception.fit import MovingPolygon, Observation, crossed, fit
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
 from expert.world.values import IntArray
@@ -23,7 +23,7 @@ BAD_FRAME = 9.0
 """A frame is aligned again where its errors' mean square exceeds that of the typical frame so many times."""
 
 
-def first_scene(seen: Observation, reference: int, most_vertices: int) -> Scene:
+def first_scene(seen: Observation, reference: int, most_vertices: int) -> MovingPolygon:
     """Outline as seen in frame `reference`, and the motion, fitted together."""
     shares = _filled(seen)
     outline = outline_of(shares[reference], most_vertices) + seen.origins[reference]
@@ -32,7 +32,7 @@ def first_scene(seen: Observation, reference: int, most_vertices: int) -> Scene:
     middles = centres + seen.origins
     motion = np.zeros((len(shares), 3))
     motion[:, :2] = middles - middles[reference]
-    scene = Scene(outline, motion, middles[reference])
+    scene = MovingPolygon(outline, motion, middles[reference])
     steps = len(shares)
     for order in (range(reference + 1, steps), range(reference - 1, -1, -1)):
         for t in order:
@@ -124,7 +124,9 @@ def _likely(turns: Array, nearest: float) -> Array:
     return turns[np.unique([0, *np.argsort(distance)[:NEAREST]])]
 
 
-def _aligned(scene: Scene, seen: Observation, t: int, turns: Iterable[float], nearest: float) -> Array:
+def _aligned(
+    scene: MovingPolygon, seen: Observation, t: int, turns: Iterable[float], nearest: float
+) -> Array:
     """Pose (3,) of frame t; of equally good turns the one next to the angle `nearest`."""
     one = Observation(seen.share[[t, t]], seen.weight[[t, t]], seen.origins[[t, t]], seen.blur)
     near = nearest + np.mod(np.asarray(turns) - nearest + np.pi, 2 * np.pi) - np.pi
@@ -139,7 +141,7 @@ def _aligned(scene: Scene, seen: Observation, t: int, turns: Iterable[float], ne
     return next(motion for cost, motion in trials if cost <= 1.02 * least + 10)
 
 
-def _realigned(scene: Scene, seen: Observation) -> Scene:
+def _realigned(scene: MovingPolygon, seen: Observation) -> MovingPolygon:
     """Frames that fit much worse than the others are aligned again, from all directions."""
     everywhere = np.arange(16) * (np.pi / 8)
     for _ in range(2):
@@ -154,7 +156,7 @@ def _realigned(scene: Scene, seen: Observation) -> Scene:
     return scene
 
 
-def frame_errors(scene: Scene, seen: Observation) -> Array:
+def frame_errors(scene: MovingPolygon, seen: Observation) -> Array:
     """Mean weighted square of the errors of the pixels that the outline crosses, per frame (T,); 1 is noise alone."""
     squares, edge = crossed(scene, seen)
     return np.array([s[e].mean() if e.any() else 0.0 for s, e in zip(squares, edge, strict=True)])

@@ -13,7 +13,6 @@ from dlm.perception import Perceived, PerceptionSettings, perceive
 from dlm.structured.calibration import Calibration, deflated
 from dlm.structured.planners import Answer, ClassPlanner, Planner
 from dlm.structured.planning import Planning
-from dlm.structured.trial import Trial
 from expert.errors import InvalidProblem, SolverFailed
 from expert.problems.contact import ContactTask, Plan
 
@@ -73,16 +72,6 @@ class StructuredModel:
     planner: Planner = field(default_factory=ClassPlanner)
     inflation: float = 0.0
     perceive: Perceive = perceive
-
-    @classmethod
-    def shipped(cls, *, best_guess: bool = False, robust: bool = True) -> "StructuredModel":
-        """With the weights that come with the package.
-
-        best_guess: only the likeliest contact class is checked.  robust: plans are tried out before one is picked.
-        """
-        from dlm.structured.weights import SHIPPED, trained_model  # it builds models, from policies
-
-        return trained_model(SHIPPED, best_guess=best_guess, trial=Trial() if robust else None)
 
     def calibrated(self, calibration: Calibration) -> "StructuredModel":
         """With corrections, each kept to what makes sense."""

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from datasets.render import Camera, Frames
 from dlm.inverse_dynamics.layer import Action, InverseDynamics
 from dlm.perception import Perceived, PerceptionSettings, perceive
-from dlm.policy import Kind, Policy, seeded
+from dlm.policy import Policy, PolicyKind, seeded
 from dlm.structured.calibration import NAMES, Calibration
 from dlm.structured.classes import MEASURED, Schedules
 from dlm.structured.model import Planned, StructuredModel
@@ -161,7 +161,7 @@ class StructuredArchitecture:
         require(len(widths) > 0 and rising, "model.widths", "rising ranks of at least 1", list(widths))
         object.__setattr__(self, "widths", widths)
 
-    def build(self, kind: Kind, program: InverseDynamics | None = None, *, seed: int = 0) -> Policy:
+    def build(self, kind: PolicyKind, program: InverseDynamics | None = None, *, seed: int = 0) -> Policy:
         """regressor, best_guess or proposals, with fresh weights drawn from the seed.  The program is not needed."""
         kinds = ("regressor", "best_guess", "proposals")
         require(kind in kinds, "stage.policy", " or ".join(kinds) + " (model: structured)", kind)
@@ -184,7 +184,7 @@ class StructuredArchitecture:
         encoder = Encoder(steps=steps, width=self.width, layers=self.layers, heads=self.heads)
         return RegressorPolicy(encoder, self.model(), self.width)
 
-    def proposer(self, kind: Kind = "proposals") -> ProposalPolicy:
+    def proposer(self, kind: PolicyKind = "proposals") -> ProposalPolicy:
         """MDR (best_guess: one class, no second chance), CVX and DLM (proposals)."""
         scorer = Scorer(
             Schedules(tuple(self.schedules)),

@@ -21,8 +21,8 @@ COMMAND = "python train.py experiment=large"
 def trained_model(path: Path, *, best_guess: bool = False, trial: Trial | None = None) -> StructuredModel:
     """The model with the scorer and the calibration of a checkpoint of a stage with proposals.
 
-    best_guess: check the likeliest class alone.  trial: what plans must survive.  Raises InvalidProblem for a missing or damaged file, and for weights of
-    another model.
+    best_guess: check the likeliest class alone.  trial: what plans must survive.  Raises InvalidProblem for a missing or
+    damaged file, and for weights of another model.
     """
     architecture = StructuredArchitecture()
     policy = architecture.proposer("best_guess" if best_guess else "proposals")
@@ -30,6 +30,11 @@ def trained_model(path: Path, *, best_guess: bool = False, trial: Trial | None =
     policy.eval()
     model = policy.model
     return replace(model, planner=replace(policy.planner, trial=trial))
+
+
+def shipped(*, best_guess: bool = False, robust: bool = True) -> StructuredModel:
+    """The model with the weights that come with the package; robust: plans are tried out before one is picked."""
+    return trained_model(SHIPPED, best_guess=best_guess, trial=Trial() if robust else None)
 
 
 def strip(source: Path, target: Path) -> None:

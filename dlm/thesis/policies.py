@@ -11,7 +11,7 @@ from torch import Tensor
 
 from dlm.inverse_dynamics.layer import Action, InverseDynamics
 from dlm.inverse_dynamics.parameters import Layout
-from dlm.policy import Kind, Policy, seeded
+from dlm.policy import Policy, PolicyKind, seeded
 from dlm.tasks import TaskBatch
 from dlm.thesis.derender import Derenderer, NetworkSizes, perceptron
 from expert.world.values import require
@@ -69,14 +69,14 @@ class ProgramPolicy(DerenderingPolicy):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ThesisModel:
+class ThesisArchitecture:
     """`model: thesis`: how to build the policies of the thesis."""
 
     name: str = "thesis"
     sizes: NetworkSizes
     layout: Layout
 
-    def build(self, kind: Kind, program: InverseDynamics, *, seed: int) -> Policy:
+    def build(self, kind: PolicyKind, program: InverseDynamics, *, seed: int) -> Policy:
         """A policy with fresh weights drawn from the seed."""
         require(kind in ("perceptron", "program"), "stage.policy", "perceptron or program", kind)
         with seeded(seed):

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from dlm.policy import Kind, Loss
+from dlm.policy import Loss, PolicyKind
 from expert.world.values import require
 
 
@@ -15,7 +15,7 @@ class Stage:
     """
 
     name: str
-    policy: Kind
+    policy: PolicyKind
     loss: Loss
     dataset: str
     warm_start: str | None = None

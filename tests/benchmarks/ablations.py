@@ -39,7 +39,7 @@ from dlm.structured.losses import class_distance
 from dlm.structured.planning import Planning
 from dlm.structured.policies import Perceiver, StructuredArchitecture, joined, unsolved
 from dlm.structured.scorer import Scorer
-from dlm.structured.weights import SHIPPED
+from dlm.structured.weights import SHIPPED, shipped
 from dlm.tasks import TaskBatch
 from dlm.training.checkpoint import load, restore_weights
 from expert.errors import InvalidProblem
@@ -102,12 +102,12 @@ def top_k(samples: dict[str, list[Sample]], options: argparse.Namespace) -> list
     for kind, some in samples.items():
         tasks = TaskBatch.of(some)
         for k in (1, 2, 4, 8, 16, 10**6):
-            shipped = StructuredModel.shipped().planner
-            assert isinstance(shipped, ClassPlanner)
-            propose = shipped.propose
+            proposing = shipped().planner
+            assert isinstance(proposing, ClassPlanner)
+            propose = proposing.propose
             assert propose is not None
             first = lambda task, k=k, propose=propose: [np.concatenate(propose(task))[:k]]  # noqa: E731
-            planner = replace(shipped, propose=first)
+            planner = replace(proposing, propose=first)
             planned = answers(StructuredModel(planner=planner, perceive=see), some, "clean")
             title = "all" if k == 10**6 else str(k)
             rows.append({"facets": kind, "checked": title, **figures(actions_of(planned), tasks)})

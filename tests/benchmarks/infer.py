@@ -24,7 +24,7 @@ from rich.table import Table
 from datasets.render import Camera, render
 from datasets.shapes import Shapes
 from datasets.specification import Sample, Specification, draw
-from dlm.infer import Scene, infer
+from dlm.infer import Given, infer
 from dlm.metrics import rotation_error, translation_error
 from dlm.simulator.replay import replay
 from expert.errors import InvalidProblem
@@ -54,7 +54,7 @@ def measure(sample: Sample, pixels: int, path: Path) -> dict[str, Any]:
     film(path, sample, pixels)
     start = time.process_time()
     try:
-        answer = infer(path, Scene(scale=WIDTH / pixels))
+        answer = infer(path, Given(scale=WIDTH / pixels))
     except InvalidProblem as error:
         return {"status": f"refused: {error}", "ok": False}
     seconds = time.process_time() - start

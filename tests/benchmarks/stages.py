@@ -24,7 +24,7 @@ from datasets.specification import Sample
 from dlm.evaluation.significance import compare_all
 from dlm.execution import expert_action, idle_action
 from dlm.inverse_dynamics.layer import Action
-from dlm.policy import Kind, Policy
+from dlm.policy import Policy, PolicyKind
 from dlm.structured import ExpertPlanner, StructuredModel
 from dlm.structured.bias import STATED
 from dlm.structured.policies import Perceiver, StructuredArchitecture, unsolved
@@ -34,7 +34,7 @@ from expert.errors import InvalidProblem
 from tests.benchmarks.structured import SEED, Record, executed, fresh
 
 Act = Callable[[Sample, Frames], Action]
-KINDS: dict[str, Kind] = {"nn": "regressor", "nnm": "regressor", "mdr": "best_guess"}
+KINDS: dict[str, PolicyKind] = {"nn": "regressor", "nnm": "regressor", "mdr": "best_guess"}
 CHECKED = "MDR, 8 checked"
 """The scorer of MDR with the planner of CVX."""
 GUESSED = "CVX, one class"
@@ -56,7 +56,7 @@ SETS = ("4-6", "12", "biased")
 BIASED_PAIRS: Pairs = (("CVX", "DLM"), ("CVX", FITTED))
 
 
-def policy(folder: Path, stage: str, see: Perceiver, kind: Kind) -> Policy | None:
+def policy(folder: Path, stage: str, see: Perceiver, kind: PolicyKind) -> Policy | None:
     """A trained stage, None if there is no such checkpoint."""
     path = folder / f"{stage}.safetensors"
     if not path.is_file():
@@ -116,7 +116,7 @@ def losses(records: list[Record]) -> np.ndarray:
 
 def learned(folder: Path, see: Perceiver) -> dict[str, Act]:
     """Rows of the stages that are there, in order; the one for the biased camera comes last."""
-    plan: list[tuple[str, str, Kind]] = [
+    plan: list[tuple[str, str, PolicyKind]] = [
         (stage.upper(), stage, KINDS.get(stage, "proposals")) for stage in ("nn", "nnm", "mdr", "cvx", "dlm")
     ]
     plan += [

@@ -37,6 +37,7 @@ from dlm.metrics import object_trajectory_loss, rotation_error, translation_erro
 from dlm.simulator import SimulatorSettings
 from dlm.structured import ExpertPlanner, Planned, StructuredModel
 from dlm.structured.policies import unsolved
+from dlm.structured.weights import shipped
 from dlm.tasks import TaskBatch
 from expert.errors import InvalidProblem
 from expert.geometry.pose import to_body, to_world
@@ -64,9 +65,9 @@ MEDIAN_BAR = 1e-3
 MOST_SECONDS = 0.110
 """Median of one video."""
 MODELS: dict[str, Callable[[], StructuredModel]] = {
-    "shipped": StructuredModel.shipped,
-    "without trials": lambda: StructuredModel.shipped(robust=False),
-    "best guess": lambda: StructuredModel.shipped(best_guess=True, robust=False),
+    "shipped": shipped,
+    "without trials": lambda: shipped(robust=False),
+    "best guess": lambda: shipped(best_guess=True, robust=False),
     "no learning": StructuredModel,
     "expert on perceived geometry": lambda: StructuredModel(planner=ExpertPlanner()),
 }

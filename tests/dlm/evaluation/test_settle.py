@@ -8,7 +8,7 @@ from dlm.policy import Policy
 from dlm.tasks import TaskBatch
 from dlm.thesis.derender import NetworkSizes
 from dlm.thesis.losses import ActionLoss
-from dlm.thesis.policies import ThesisModel
+from dlm.thesis.policies import ThesisArchitecture
 from dlm.training.loop import Training
 from dlm.training.stage import Schedule
 
@@ -16,7 +16,7 @@ SMALL = NetworkSizes(channels=(2, 3, 4), latent=8, recurrent_layers=1, hidden_la
 
 
 def trained(tasks: TaskBatch) -> Policy:
-    policy = ThesisModel(sizes=SMALL, layout=Layout()).build("perceptron", InverseDynamics(), seed=0)
+    policy = ThesisArchitecture(sizes=SMALL, layout=Layout()).build("perceptron", InverseDynamics(), seed=0)
     policy.fit_centre(tasks)
     training = Training(policy, ActionLoss(), tasks, Schedule(batch_size=4, learning_rate=1e-2))
     for _ in range(5):

@@ -9,7 +9,7 @@ from PIL import Image
 
 from datasets.render import Palette, render
 from datasets.specification import Sample
-from dlm.infer import Clip, Inference, Scene, Segmentation, infer, read_clip
+from dlm.infer import Clip, Given, Inference, Segmentation, VideoFile, infer, read_clip
 from dlm.infer.drawing import draw_inference
 from dlm.infer.view import find_floor, view_of
 from dlm.simulator.replay import replay
@@ -20,7 +20,7 @@ from expert.files.document import save
 from expert.verify.plan.check import check_plan
 from tests.support.clips import CAMERA, SCALE, SIZE, drawn, write_clip
 
-KNOWN = Scene(scale=SCALE)
+KNOWN = Given(scale=SCALE)
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +72,7 @@ def test_the_expert_plans_for_what_was_perceived(clips: list[tuple[Sample, Path]
 
 def test_a_known_size_gives_the_scale(clips: list[tuple[Sample, Path]], answers: list[Inference]) -> None:
     (sample, path), known = clips[0], answers[0]
-    answer = infer(path, Scene(object_size=sample.task.body.size))
+    answer = infer(path, Given(object_size=sample.task.body.size))
     assert answer.view.scale == pytest.approx(SCALE, rel=0.02)  # as well as a compressed outline is seen
     np.testing.assert_allclose(answer.planned.perceived.poses, known.planned.perceived.poses, atol=2e-3)
 
@@ -99,9 +99,9 @@ def test_frames_are_taken_at_equally_spaced_times(tmp_path: Path) -> None:
     clip = read_clip(path, steps=5)
     assert clip.times.tolist() == pytest.approx([0, 0.25, 0.5, 0.75, 1.0])
     np.testing.assert_allclose(clip.frames.mean(axis=(1, 2, 3)), grey[::5], atol=4.5)
-    part = read_clip(path, steps=3, start=0.5, end=0.7)
+    part = read_clip(VideoFile(path=path, start=0.5, end=0.7), steps=3)
     np.testing.assert_allclose(part.frames.mean(axis=(1, 2, 3)), [100, 120, 140], atol=4.5)
-    assert read_clip(path, steps=5, rate=10.0).duration == pytest.approx(2.0)
+    assert read_clip(VideoFile(path=path, rate=10.0), steps=5).duration == pytest.approx(2.0)
 
 
 def test_a_wide_video_is_cut_to_the_motion(tasks: TaskBatch) -> None:
@@ -181,7 +181,7 @@ def test_the_animation_shows_video_and_simulation(answers: list[Inference], tmp_
 )
 def test_a_scene_says_what_a_video_cannot(scene: dict[str, float], field: str) -> None:
     with pytest.raises(InvalidProblem, match=field):
-        Scene(**scene)
+        Given(**scene)
 
 
 def test_a_segmentation_takes_one_way(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from dlm.simulator.__main__ import main as simulate
 from dlm.tasks import TaskBatch
 from dlm.thesis.derender import NetworkSizes
 from dlm.thesis.losses import ParameterLoss
-from dlm.thesis.policies import ThesisModel
+from dlm.thesis.policies import ThesisArchitecture
 from dlm.training.loop import Training
 from dlm.training.stage import Schedule, Stage
 from expert.__main__ import main as expert
@@ -43,7 +43,7 @@ def folder(tasks: TaskBatch, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "text.mp4").write_text("not a video\n" * 100)
     (folder / "empty.mp4").write_bytes(b"")
     small = NetworkSizes(channels=(2, 3, 4), latent=8, recurrent_layers=1, hidden_layers=1)
-    policy = ThesisModel(sizes=small, layout=Layout()).build("perceptron", InverseDynamics(), seed=0)
+    policy = ThesisArchitecture(sizes=small, layout=Layout()).build("perceptron", InverseDynamics(), seed=0)
     stage = Stage(name="nn", policy="perceptron", loss=ParameterLoss(), dataset="train")
     training = Training(policy, stage.loss, tasks, Schedule())
     training.checkpoint(stage, "thesis", {}).save(folder / "thesis.safetensors")

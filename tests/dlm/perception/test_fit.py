@@ -6,16 +6,24 @@ import numpy as np
 import pytest
 
 from dlm.perception.contacts import snap_contacts
-from dlm.perception.fit import Observation, Scene, calibrated, fit, modelled, quadratic, without_outliers
+from dlm.perception.fit import (
+    MovingPolygon,
+    Observation,
+    calibrated,
+    fit,
+    modelled,
+    quadratic,
+    without_outliers,
+)
 from dlm.perception.prune import prune, straightness, without_tangles
 from expert.geometry.pose import rotation
 
 PENTAGON = np.array([[5.0, 6.0], [14.0, 6.0], [17.0, 11.0], [10.0, 17.0], [4.0, 12.0]])
 MOTION = np.array([[0.0, 0.0, 0.0], [0.4, 1.3, 0.2], [1.2, 2.1, 0.5]])
-TRUTH = Scene(PENTAGON, MOTION, np.array([10.0, 10.0]))
+TRUTH = MovingPolygon(PENTAGON, MOTION, np.array([10.0, 10.0]))
 
 
-def observed(scene: Scene, blur: float = 0.0, deviation: float = 0.01, seed: int = 0) -> Observation:
+def observed(scene: MovingPolygon, blur: float = 0.0, deviation: float = 0.01, seed: int = 0) -> Observation:
     """What a camera with some noise sees of it."""
     blank = np.zeros((len(scene.motion), 28, 28))
     seen = Observation(blank, blank + deviation**-2, np.zeros((len(blank), 2)), blur)
@@ -23,11 +31,11 @@ def observed(scene: Scene, blur: float = 0.0, deviation: float = 0.01, seed: int
     return replace(seen, share=share + np.random.default_rng(seed).normal(0, deviation, share.shape))
 
 
-def disturbed(seed: int) -> Scene:
+def disturbed(seed: int) -> MovingPolygon:
     rng = np.random.default_rng(seed)
     motion = MOTION + rng.normal(0, [0.3, 0.3, 0.05], MOTION.shape)
     motion[0] = 0
-    return Scene(PENTAGON + rng.normal(0, 0.4, PENTAGON.shape), motion, TRUTH.centre)
+    return MovingPolygon(PENTAGON + rng.normal(0, 0.4, PENTAGON.shape), motion, TRUTH.centre)
 
 
 @pytest.mark.parametrize("blur", [0.0, 1.2])
@@ -117,8 +125,8 @@ def test_contacts_are_exact_and_nothing_enters_the_floor() -> None:
     for t, angle in enumerate([0.0, -0.15, -0.4]):
         shift = corner - TRUTH.centre - rotation(angle) @ (corner - TRUTH.centre)
         motion[t] = [*shift, angle]
-    seen = observed(Scene(PENTAGON, motion, TRUTH.centre), deviation=0.03)
-    rough, _ = fit(Scene(PENTAGON + 0.05, motion, TRUTH.centre), seen)
+    seen = observed(MovingPolygon(PENTAGON, motion, TRUTH.centre), deviation=0.03)
+    rough, _ = fit(MovingPolygon(PENTAGON + 0.05, motion, TRUTH.centre), seen)
     found = snap_contacts(rough, seen, floor=6.0, reach=0.25).placed()
     assert np.abs(found[0, :2, 1] - 6).max() < 1e-8
     assert np.abs(found[:, 1] - found[0, 1]).max() < 1e-8
@@ -128,7 +136,7 @@ def test_contacts_are_exact_and_nothing_enters_the_floor() -> None:
 
 def test_a_gap_that_the_data_shows_stays() -> None:
     motion = np.array([[0.0, 0.0, 0.0], [0.0, 0.2, 0.0]])
-    seen = observed(Scene(PENTAGON, motion, TRUTH.centre))
-    found = snap_contacts(Scene(PENTAGON, motion, TRUTH.centre), seen, floor=6.0, reach=0.25).placed()
+    seen = observed(MovingPolygon(PENTAGON, motion, TRUTH.centre))
+    found = snap_contacts(MovingPolygon(PENTAGON, motion, TRUTH.centre), seen, floor=6.0, reach=0.25).placed()
     assert np.abs(found[0, :2, 1] - 6).max() < 1e-8
     assert np.abs(found[1, :2, 1] - 6.2).max() < 0.03

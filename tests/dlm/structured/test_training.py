@@ -6,7 +6,7 @@ import pytest
 import torch
 from matplotlib.figure import Figure
 
-from dlm.policy import Kind, Loss
+from dlm.policy import Loss, PolicyKind
 from dlm.simulator import SimulatorSettings
 from dlm.structured.bias import STATED
 from dlm.structured.examples import Example
@@ -30,7 +30,7 @@ def train(
     path: Path,
     loss: Loss,
     *,
-    kind: Kind = "proposals",
+    kind: PolicyKind = "proposals",
     resume: bool = False,
     **schedule: float,
 ) -> list[Row]:
@@ -52,7 +52,7 @@ def train(
 
 
 SMOOTH = SimulatorSettings(kappa=1250.0)
-STAGES: dict[str, tuple[Kind, Loss]] = {
+STAGES: dict[str, tuple[PolicyKind, Loss]] = {
     "nn": ("regressor", ActionLoss()),
     "nnm": ("regressor", SimulationLoss(simulator=SMOOTH)),
     "mdr": ("best_guess", ClassLoss()),

@@ -16,9 +16,9 @@ from dlm.thesis.losses import (
     parameter_distance,
     slack_size,
 )
-from dlm.thesis.policies import ThesisModel
+from dlm.thesis.policies import ThesisArchitecture
 
-MODEL = ThesisModel(sizes=NetworkSizes(), layout=Layout())
+MODEL = ThesisArchitecture(sizes=NetworkSizes(), layout=Layout())
 
 
 @pytest.fixture(scope="module")

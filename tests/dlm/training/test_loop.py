@@ -11,7 +11,7 @@ from dlm.policy import Policy
 from dlm.tasks import TaskBatch
 from dlm.thesis.derender import NetworkSizes
 from dlm.thesis.losses import ParameterLoss
-from dlm.thesis.policies import ThesisModel
+from dlm.thesis.policies import ThesisArchitecture
 from dlm.training.checkpoint import load
 from dlm.training.loop import Row, Training, Watch, fit
 from dlm.training.stage import Schedule, Stage
@@ -19,7 +19,7 @@ from expert.errors import InvalidProblem, SolverFailed
 
 STAGE = Stage(name="mdr", policy="program", loss=ParameterLoss(), dataset="train")
 SMALL = NetworkSizes(channels=(2, 3, 4), latent=8, recurrent_layers=1, hidden_layers=1)
-MODEL = ThesisModel(sizes=SMALL, layout=Layout())
+MODEL = ThesisArchitecture(sizes=SMALL, layout=Layout())
 QUIET = Watch(measure=lambda policy: {}, picture=lambda policy: Figure(figsize=(1, 1)))
 
 
@@ -107,7 +107,7 @@ def test_resuming_a_finished_stage_changes_nothing_and_more_iterations_go_on(
 
 def test_four_tasks_are_learnt_by_heart_without_dropout(tasks: TaskBatch) -> None:
     sizes = replace(SMALL, dropout=0.0)
-    policy = ThesisModel(sizes=sizes, layout=Layout()).build("program", torch.nn.Identity(), seed=0)
+    policy = ThesisArchitecture(sizes=sizes, layout=Layout()).build("program", torch.nn.Identity(), seed=0)
     policy.fit_centre(tasks)
     schedule = Schedule(batch_size=4, learning_rate=1e-2)
     training = Training(policy, STAGE.loss, tasks, schedule)
