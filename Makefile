@@ -37,7 +37,7 @@ lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/codespell expert datasets dlm tests docs configs README.md CHANGELOG.md train.py evaluate.py
+	$(BIN)/codespell expert datasets dlm examples tests docs configs README.md CHANGELOG.md train.py evaluate.py
 
 bench: setup
 	@status=0; for file in tests/benchmarks/[a-z]*.py; do \
