@@ -6,10 +6,17 @@ from typing import Annotated, Generic, TypeVar
 
 import numpy as np
 
-from expert.contact.model import region_rows, rho_limits, wall_rows
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
-from expert.mechanics import ExternalContact, external_contacts, friction_rays, inertial_wrench
+from expert.mechanics import (
+    ExternalContact,
+    external_contacts,
+    friction_rays,
+    inertial_wrench,
+    region_rows,
+    rho_limits,
+    wall_rows,
+)
 from expert.problems.contact import FREE, ContactTask, Plan
 from expert.world.values import IntArray, require
 

@@ -15,13 +15,12 @@ from dlm.policy import Policy
 from dlm.simulator import SimulatorSettings
 from dlm.structured.bias import Bias
 from dlm.structured.calibration import Calibration
-from dlm.structured.check import ROUNDS, screen
 from dlm.structured.classes import Schedules
 from dlm.structured.examples import Example
 from dlm.structured.policies import ProposalPolicy
 from dlm.structured.scorer import Scorer, stack
 from dlm.tasks import TaskBatch
-from expert.contact.model import model_of
+from expert.contact.fixed_modes import costs_at_modes
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
 
@@ -95,8 +94,7 @@ class CheckedClassLoss:
 def regrets(sample: Sample, schedules: Schedules) -> Array:
     """Relative cost of every class over the best one's, from 0 to MOST_REGRET, (k,)."""
     modes = schedules.modes(schedules.classes(len(sample.task.body.vertices)))
-    model = model_of(sample.task)
-    bounds, costs, *_ = screen(model, modes, 1e-2, ROUNDS, True)
+    bounds, costs = costs_at_modes(sample.task, modes, gap=1e-2)
     least = np.where(np.isfinite(costs), costs, np.maximum(bounds, 0.0))
     best = sample.plan.objective / sample.task.weight**2
     return np.clip(least / max(best, 1e-9) - 1, 0.0, MOST_REGRET)

@@ -10,7 +10,6 @@ from datasets.label import Label, Labelling, label
 from dlm.structured.check import NODES, check
 from dlm.structured.classes import Schedules
 from dlm.structured.trial import Trial
-from expert.contact.model import model_of
 from expert.problems.contact import ContactTask, Plan
 from expert.world.values import IntArray
 
@@ -54,14 +53,14 @@ class ClassPlanner:
     node_limit: int = NODES
 
     def __call__(self, task: ContactTask) -> Answer:
-        model, checked = model_of(task), 0
+        checked = 0
         tries = 1 if self.trial is None else self.trial.candidates
         safest = Answer(None, task, 0, np.inf)
         for classes in (self.propose or self.every_class)(task):
             checked += len(classes)
             modes = self.schedules.modes(classes)
             while tries > 0 and len(modes):
-                plan = check(task, modes, node_limit=self.node_limit, model=model).plan
+                plan = check(task, modes, node_limit=self.node_limit).plan
                 if plan is None:
                     break
                 risk = 0.0 if self.trial is None else self.trial.risk(task, plan)

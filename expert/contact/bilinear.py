@@ -13,7 +13,7 @@ import pyscipopt
 from pyscipopt import quicksum
 
 from expert.contact.recovery import Found, balanced, modes_of, plan_of
-from expert.contact.scaled import ScaledTask
+from expert.contact.scaled import ScaledTask, end_points
 from expert.errors import SolverFailed
 from expert.geometry.pose import Array, cross
 from expert.mip.backends import scip_answer, scip_limits
@@ -24,9 +24,9 @@ TOLERANCE = 1e-7
 
 
 @dataclass(frozen=True)
-class Model:
+class Bilinear:
     """SCIP's model and its variables: touch, rho, normal, tangential, w by (t, c, f); region by (t, c, r);
-    p by (t, c, d); reaction by (i,)."""
+    p by (t, c, d); reaction by (t, e)."""
 
     scip: pyscipopt.Model
     touch: dict
@@ -36,7 +36,7 @@ class Model:
     w: dict
     region: dict
     p: dict
-    reaction: list
+    reaction: dict
 
 
 def solve(task: ContactTask, *, gap: float = 1e-3, time_limit: float = 60.0) -> Plan:
@@ -65,7 +65,7 @@ def solve(task: ContactTask, *, gap: float = 1e-3, time_limit: float = 60.0) -> 
     )
 
 
-def build(task: ContactTask, s: ScaledTask) -> Model:
+def build(task: ContactTask, s: ScaledTask) -> Bilinear:
     """All constraints and the cost, one group after the other."""
     m = _variables(task, s)
     _contact(m, task, s)
@@ -77,23 +77,21 @@ def build(task: ContactTask, s: ScaledTask) -> Model:
 
 
 def _indices(task: ContactTask, s: ScaledTask) -> tuple[range, range, range, range]:
-    T, F, R = s.shape
-    return range(T), range(task.fingers.count), range(F), range(R)
+    return range(s.steps), range(task.fingers.count), range(s.facets), range(s.regions)
 
 
-def _variables(task: ContactTask, s: ScaledTask) -> Model:
+def _variables(task: ContactTask, s: ScaledTask) -> Bilinear:
     scip = pyscipopt.Model()
     scip.hideOutput()
     steps, fingers, facets, regions = _indices(task, s)
-    friction = task.fingers.friction * task.robustness.cone_fraction
+    friction = s.friction
     low, high = s.workspace
 
     def grid(name: str, *axes: range, **options: Any) -> dict:
         return {i: scip.addVar(name=f"{name}{list(i)}", **options) for i in product(*axes)}
 
     touching = (steps, fingers, facets)
-    limits = s.reaction_rows.T @ s.reaction_limits
-    return Model(
+    return Bilinear(
         scip=scip,
         touch=grid("touch", *touching, vtype="B"),
         rho=grid("rho", *touching, lb=0.0, ub=1.0),
@@ -102,15 +100,17 @@ def _variables(task: ContactTask, s: ScaledTask) -> Model:
         w=grid("w", *touching, lb=0.0, ub=s.max_force),
         region=grid("region", steps, fingers, regions, vtype="B"),
         p={(t, c, d): scip.addVar(lb=low[d], ub=high[d]) for t, c, d in product(steps, fingers, range(2))},
-        reaction=[scip.addVar(lb=0.0, ub=limit) for limit in limits],
+        reaction={
+            (t, e): scip.addVar(lb=0.0, ub=s.limit[t, s.group[t, e]]) for t, e in np.argwhere(s.group >= 0)
+        },
     )
 
 
-def _contact(m: Model, task: ContactTask, s: ScaledTask) -> None:
+def _contact(m: Bilinear, task: ContactTask, s: ScaledTask) -> None:
     """Force within its cone while the finger stays; w = rho lambda_n; rho within the margins."""
     add, margin = m.scip.addCons, task.fingers.facet_margin
-    friction = task.fingers.friction * task.robustness.cone_fraction
-    last = len(s.centres) - 1
+    friction = s.friction
+    last = s.steps - 1
     for (t, c, f), touch in m.touch.items():
         normal, tangential, rho = m.normal[t, c, f], m.tangential[t, c, f], m.rho[t, c, f]
         stays = [touch] if t == last else [touch, m.touch[t + 1, c, f]]
@@ -125,7 +125,7 @@ def _contact(m: Model, task: ContactTask, s: ScaledTask) -> None:
         add(m.w[t, c, f] == rho * normal)
 
 
-def _sequence(m: Model, task: ContactTask, s: ScaledTask) -> None:
+def _sequence(m: Bilinear, task: ContactTask, s: ScaledTask) -> None:
     """One facet or one region; free before another facet; one rho per contact interval; contacts that last."""
     add = m.scip.addCons
     steps, fingers, facets, regions = _indices(task, s)
@@ -144,56 +144,51 @@ def _sequence(m: Model, task: ContactTask, s: ScaledTask) -> None:
             add(touch <= quicksum(m.touch[u, c, f] for u in (t - 1, t + 1) if u in steps))
 
 
-def _places(m: Model, task: ContactTask, s: ScaledTask) -> None:
+def _places(m: Bilinear, task: ContactTask, s: ScaledTask) -> None:
     """Fingers on their facets, or in their regions; all of them clear of walls.  Big-M from the workspace box."""
     add = m.scip.addCons
     low, high = s.workspace
     margin = task.fingers.facet_margin
     for (t, c, f), touch in m.touch.items():
-        (ax, ay), (bx, by) = s.levers[t, f] + s.centres[t]
+        (ax, ay), (bx, by) = end_points(s)[t, f] + s.centre[t]
         for d, (a, b) in enumerate(((ax, bx), (ay, by))):
             ends = (a + margin * (b - a), b - margin * (b - a))
             offset = m.p[t, c, d] - a - m.rho[t, c, f] * (b - a)
             add(offset <= (high[d] - min(ends)) * (1 - touch))
             add(offset >= (low[d] - max(ends)) * (1 - touch))
     for (t, c, r), inside in m.region.items():
-        for normal, b in zip(s.region_A[t, r], s.region_b[t, r], strict=True):
-            farthest = float(np.maximum(normal * low, normal * high).sum())
-            if normal.any():
-                add(
-                    normal[0] * m.p[t, c, 0] + normal[1] * m.p[t, c, 1]
-                    <= b + max(farthest - b, 0.0) * (1 - inside)
-                )
+        for x, y, b in s.region[t, r]:
+            farthest = max(x * low[0], x * high[0]) + max(y * low[1], y * high[1])
+            if x or y:
+                add(x * m.p[t, c, 0] + y * m.p[t, c, 1] <= b + max(farthest - b, 0.0) * (1 - inside))
     for t, c in product(*_indices(task, s)[:2]):
-        for normal, b in zip(s.wall_A, s.wall_b, strict=True):
-            add(normal[0] * m.p[t, c, 0] + normal[1] * m.p[t, c, 1] <= b)
+        for x, y, d in s.walls:
+            add(x * m.p[t, c, 0] + y * m.p[t, c, 1] >= d)
 
 
-def _dynamics(m: Model, task: ContactTask, s: ScaledTask) -> None:
+def _dynamics(m: Bilinear, task: ContactTask, s: ScaledTask) -> None:
     """Newton and Euler at every step: force lambda_n n + lambda_t tau, torque (a - q) x lambda + l w."""
     steps, fingers, facets, _ = _indices(task, s)
-    n, tau = task.body.frames_w(task.trajectory.poses)
-    length = np.linalg.norm(s.levers[..., 1, :] - s.levers[..., 0, :], axis=-1)
+    rays = [(int(t), int(e)) for t, e in m.reaction]
     for t in steps:
         for row in range(3):
-            terms = [s.reactions[t, row, i] * x for i, x in enumerate(m.reaction) if s.reactions[t, row, i]]
+            terms = [s.rays[t, e, row] * m.reaction[u, e] for u, e in rays if u == t and s.rays[t, e, row]]
             for c, f in product(fingers, facets):
-                gain_n, gain_t = (
-                    _wrench(s.levers[t, f, 0], direction)[row] for direction in (n[t, f], tau[t, f])
-                )
+                along = (s.normal[t, f], s.tangent[t, f])
+                gain_n, gain_t = (_wrench(s.arm[t, f], direction)[row] for direction in along)
                 terms += [gain_n * m.normal[t, c, f], gain_t * m.tangential[t, c, f]]
-                terms += [length[t, f] * m.w[t, c, f]] if row == 2 else []
+                terms += [s.length[f] * m.w[t, c, f]] if row == 2 else []
             m.scip.addCons(quicksum(terms) == s.required[t, row])
-    for row, limit in zip(s.reaction_rows, s.reaction_limits, strict=True):
-        if row.any():
-            m.scip.addCons(quicksum(m.reaction[i] for i in np.flatnonzero(row)) <= limit)
+    for t, g in sorted({(int(t), int(s.group[t, e])) for t, e in rays}):
+        group = [m.reaction[u, e] for u, e in rays if u == t and s.group[t, e] == g]
+        m.scip.addCons(quicksum(group) <= s.limit[t, g])
 
 
 def _wrench(arm: Array, force: Array) -> Array:
     return np.array([*force, float(cross(arm, force))])
 
 
-def _cost(m: Model, task: ContactTask, s: ScaledTask) -> None:
+def _cost(m: Bilinear, task: ContactTask, s: ScaledTask) -> None:
     """sum |lambda|^2 + |p_ddot|^2 - beta, one epigraph variable per square."""
     terms: list[Any] = []
 
@@ -202,44 +197,46 @@ def _cost(m: Model, task: ContactTask, s: ScaledTask) -> None:
         m.scip.addCons(weight * expression * expression <= square)
         terms.append(square)
 
-    if s.force_cost:
+    if s.force_weight:
         for component in (*m.normal.values(), *m.tangential.values()):
-            charge(s.force_cost, component)
-    if s.acceleration_cost:
+            charge(s.force_weight, component)
+    if s.acceleration_weight:
         for t, c, d in m.p:
             if t >= 2:
-                charge(s.acceleration_cost, m.p[t, c, d] - 2 * m.p[t - 1, c, d] + m.p[t - 2, c, d])
-    if s.margin_cost:
-        mu = task.fingers.friction
+                charge(s.acceleration_weight, m.p[t, c, d] - 2 * m.p[t - 1, c, d] + m.p[t - 2, c, d])
+    if s.margin_weight:
+        mu = s.true_friction
         for i in m.normal:
             beta = m.scip.addVar(lb=0.0)
             for side in (1, -1):
-                m.scip.addCons(np.hypot(1, mu) * beta <= mu * m.normal[i] + side * m.tangential[i])
-            terms.append(-s.margin_cost * beta)
+                m.scip.addCons(beta <= mu * m.normal[i] + side * m.tangential[i])
+            terms.append(-s.margin_weight * beta)
     m.scip.setObjective(quicksum(terms))
 
 
-def _found(m: Model, task: ContactTask, s: ScaledTask) -> Found:
+def _found(m: Bilinear, task: ContactTask, s: ScaledTask) -> Found:
     """Values of the best point; cone weights alpha from the force's components."""
     best: Any = m.scip.getBestSol()
-    shape = (s.shape[0], task.fingers.count)
+    shape = (s.steps, task.fingers.count)
 
     def values(grid: dict, last: int) -> Array:
         return np.array([best[v] for v in grid.values()]).reshape(*shape, last)
 
-    facets = s.shape[1]
+    facets = s.facets
     modes = modes_of(values(m.touch, facets))
     facet = np.maximum(modes, 0)[..., None]
     rho, normal, tangential = (
         np.take_along_axis(values(grid, facets), facet, axis=2)[..., 0]
         for grid in (m.rho, m.normal, m.tangential)
     )
-    friction = task.fingers.friction * task.robustness.cone_fraction
-    alpha = np.stack([normal + tangential / friction, normal - tangential / friction], axis=2) / 2
+    alpha = np.stack([normal + tangential / s.friction, normal - tangential / s.friction], axis=2) / 2
+    reactions = np.zeros(s.group.shape)
+    for i, v in m.reaction.items():
+        reactions[i] = best[v]
     return Found(
         modes=modes,
         rho=np.where(modes == FREE, 0.0, rho),
         alpha=alpha,
         free=values(m.p, 2),
-        reactions=np.array([best[v] for v in m.reaction]),
+        reactions=reactions,
     )

@@ -2,7 +2,8 @@
 
 State of a finger: 0 free, or 1 + 3 f + a on facet f for the first (a = 0), second (1), or a later step (2).  A finger leaves
 a facet before it takes another one.  Within an interval rho is constant; force may act at t only if the finger stays
-until t + 1 (or t is the last step): the last step of an interval is its force-free release.
+until t + 1 (or t is the last step): the last step of an interval is its force-free release.  Dynamic programming
+over joint states gives bounds.
 """
 
 import itertools
@@ -11,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from expert.contact.model import Model
+from expert.contact.scaled import ScaledTask
 from expert.contact.steps import solve_step
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
@@ -67,58 +68,58 @@ def _successors(facets: int, min_interval: int) -> list[list[int]]:
     return follow
 
 
-def step_costs(model: Model, fingers: int) -> Array:
+def step_costs(scaled: ScaledTask, fingers: int) -> Array:
     """phi[t, S]: lower bound of the force cost at t with active set S, (T, (F + 1)^C); inf: proved impossible.
 
     S in base F + 1: one digit per finger, 1 + facet or 0.  Fingers are interchangeable, so each multiset is solved once.
     """
-    base = model.facets + 1
+    base = scaled.facets + 1
     sets = np.array(list(itertools.combinations_with_replacement(range(base), fingers)))
     digits = np.array(list(itertools.product(range(base), repeat=fingers)))
     place = base ** np.arange(fingers)[::-1]
     column = np.empty(base**fingers, dtype=np.int64)
     column[sets @ place] = np.arange(len(sets))
-    return _set_costs(model, sets)[:, column[np.sort(digits, axis=1) @ place]]
+    return _set_costs(scaled, sets)[:, column[np.sort(digits, axis=1) @ place]]
 
 
 @compiled
-def _set_costs(model: Model, sets: IntArray) -> Array:
-    T, M = len(model.required), len(sets)
+def _set_costs(scaled: ScaledTask, sets: IntArray) -> Array:
+    T, M = len(scaled.required), len(sets)
     costs = np.full((T, M), np.inf)
     for k in range(M):
         facets = sets[k][sets[k] > 0] - 1
         for t in range(T):
-            lo, hi = model.low[t][facets], model.high[t][facets]
+            lo, hi = scaled.low[t][facets], scaled.high[t][facets]
             if (lo <= hi).all():
-                status, _, bound, _, _ = solve_step(model, t, facets, lo, hi)
+                status, _, bound, _, _ = solve_step(scaled, t, facets, lo, hi)
                 if status != INFEASIBLE:
                     costs[t, k] = bound
     return costs
 
 
-def window_costs(model: Model) -> Array:
+def window_costs(scaled: ScaledTask) -> Array:
     """Least smoothing cost at t of a finger that sat on f since t - 2, (T, 1 + 3 F) by state; inf: rho has no room."""
-    T = model.steps
-    cost = np.zeros((T, 1 + 3 * model.facets))
-    impossible = model.low > model.high
+    T = scaled.steps
+    cost = np.zeros((T, 1 + 3 * scaled.facets))
+    impossible = scaled.low > scaled.high
     for age in range(3):
         cost[:, 1 + age :: 3][impossible] = np.inf
-    start = model.centre[:, None] + model.arm
+    start = scaled.centre[:, None] + scaled.arm
     for t in range(2, T):
-        p0, p1 = (x[t] - 2 * x[t - 1] + x[t - 2] for x in (start, model.edge))
-        lo, hi = model.low[t - 2 : t + 1].max(axis=0), model.high[t - 2 : t + 1].min(axis=0)
+        p0, p1 = (x[t] - 2 * x[t - 1] + x[t - 2] for x in (start, scaled.edge))
+        lo, hi = scaled.low[t - 2 : t + 1].max(axis=0), scaled.high[t - 2 : t + 1].min(axis=0)
         curvature = np.maximum((p1 * p1).sum(axis=1), 1e-300)
         rho = np.clip(-(p0 * p1).sum(axis=1) / curvature, lo, np.maximum(lo, hi))
-        value = model.acceleration_weight * ((p0 + rho[:, None] * p1) ** 2).sum(axis=1)
+        value = scaled.acceleration_weight * ((p0 + rho[:, None] * p1) ** 2).sum(axis=1)
         cost[t, 3::3] = np.where(lo <= hi, value, np.inf)
     return cost
 
 
-def last_costs(model: Model, phi: Array, moves: Moves) -> Array:
+def last_costs(scaled: ScaledTask, phi: Array, moves: Moves) -> Array:
     """Force cost of the last step by joint state, (N,): every finger in contact may push."""
-    digit = (model.facets + 1) ** np.arange(moves.states.shape[1])[::-1]
+    digit = (scaled.facets + 1) ** np.arange(moves.states.shape[1])[::-1]
     cost = phi[-1, ((moves.states + 2) // 3) @ digit]
-    if model.min_interval > 1:
+    if scaled.min_interval > 1:
         just_arrived = ((moves.states > 0) & (moves.states % 3 == 1)).any(axis=1)
         cost = np.where(just_arrived, np.inf, cost)
     return cost

@@ -1,18 +1,21 @@
 """From contact modes and positions to forces and a plan's arrays: one exact program per step at fixed positions."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from expert.contact.leaf import pushes
-from expert.contact.model import Model
+from expert.contact.box import pushes
+from expert.contact.plans import contact_forces, plan_cost, wrench_residual
+from expert.contact.scaled import ScaledTask
 from expert.contact.sequence import Sequence, smoothing
 from expert.contact.steps import rays_per_end, solve_step
 from expert.errors import SolverFailed
 from expert.geometry.pose import Array
-from expert.mechanics import external_contacts
 from expert.numeric.qp import SOLVED, compiled
-from expert.problems.contact import SUPPORT, ContactForce, ContactTask
+from expert.problems.contact import ContactForce, ContactTask, Plan
+
+RESIDUAL = 1e-8
+"""Largest Newton-Euler residual of a plan that is handed out, over m g and m g L."""
 
 
 class Forces(NamedTuple):
@@ -27,14 +30,14 @@ class Forces(NamedTuple):
 
 
 @compiled
-def forces_at(model: Model, sequence: Sequence, z: Array) -> Forces:
+def forces_at(scaled: ScaledTask, sequence: Sequence, z: Array) -> Forces:
     """Exact torque: with positions fixed, the wrench balance is linear."""
     T, C = sequence.modes.shape
-    weights = np.zeros((T, 3 * C + model.rays.shape[1]))
+    weights = np.zeros((T, 3 * C + scaled.rays.shape[1]))
     total = smoothing(sequence, z)
     for t in range(T):
         on = pushes(sequence, t)
-        status, cost, _, _, x = solve_step(model, t, sequence.facet[on], z[on], z[on])
+        status, cost, _, _, x = solve_step(scaled, t, sequence.facet[on], z[on], z[on])
         if status != SOLVED:
             return Forces(np.inf, weights)
         total += cost
@@ -42,46 +45,43 @@ def forces_at(model: Model, sequence: Sequence, z: Array) -> Forces:
     return Forces(total, weights)
 
 
-def positions_at(task: ContactTask, model: Model, sequence: Sequence, z: Array) -> Array:
-    """Finger positions (T, C, 2) [m], world frame."""
-    return model.origin + task.body.size * (sequence.offset + sequence.map @ z)
+def plan_at(task: ContactTask, scaled: ScaledTask, sequence: Sequence, z: Array, **known: Any) -> Plan:
+    """The plan at z, its forces computed again with exact torques; `known`: what else there is to say.
+
+    Raises SolverFailed where its forces miss Newton-Euler by more than RESIDUAL.
+    """
+    positions = scaled.origin + scaled.size * (sequence.offset + sequence.map @ z)
+    forces, reactions = _forces(task, scaled, sequence, z)
+    residual = wrench_residual(task, positions, forces, reactions)
+    if not residual <= RESIDUAL:
+        raise SolverFailed(f"the best plan misses Newton-Euler by {residual:.2g} of the object's weight")
+    return Plan(
+        objective=plan_cost(task, sequence.modes, positions, forces),
+        modes=sequence.modes,
+        positions=positions,
+        forces=forces,
+        contact_forces=reactions,
+        residual=residual,
+        **known,
+    )
 
 
-def all_forces(
-    task: ContactTask, model: Model, sequence: Sequence, z: Array
+def _forces(
+    task: ContactTask, scaled: ScaledTask, sequence: Sequence, z: Array
 ) -> tuple[Array, tuple[ContactForce, ...]]:
-    """Finger forces (T, C, 2) [N, on the object] and what the environment exerts.  Raises SolverFailed."""
-    found = forces_at(model, sequence, z)
+    """Finger forces (T, C, 2) [N, on the object] and what the environment exerts."""
+    found = forces_at(scaled, sequence, z)
     if not np.isfinite(found.cost):
         raise SolverFailed("the forces of a plan could not be computed again at its contact positions")
-    fingers, reactions = np.zeros((*sequence.modes.shape, 2)), []
-    each = rays_per_end(model)
-    slopes = model.friction * np.array([1.0, -1.0, 0.0][:each])
-    for t, weights in enumerate(task.weight * found.weights):
+    fingers, reactions = np.zeros((*sequence.modes.shape, 2)), np.zeros(scaled.group.shape)
+    each = rays_per_end(scaled)
+    slopes = scaled.friction * np.array([1.0, -1.0, 0.0][:each])
+    for t, weights in enumerate(found.weights):
         on = pushes(sequence, t)
         for i, k in enumerate(on):
             f, share = sequence.facet[k], weights[each * i : each * (i + 1)]
             c = int(np.flatnonzero(sequence.interval[t] == k)[0])
-            fingers[t, c] = share.sum() * model.normal[t, f] + (share @ slopes) * model.tangent[t, f]
-        reactions += _environment(task, t, weights[each * len(on) :])
-    return fingers, tuple(reactions)
-
-
-def _environment(task: ContactTask, t: int, weights: Array) -> list[ContactForce]:
-    """Contact forces at step t from the weights [N] of the free rays, and those that sliding on the support fixes."""
-    reactions, used = [], 0
-    for contact in external_contacts(task):
-        if contact.step != t:
-            continue
-        force = contact.rays[0]
-        if not contact.fixed:
-            share = weights[used : used + len(contact.rays)]
-            used += len(contact.rays)
-            force = share @ contact.rays / (task.weight if contact.wall == SUPPORT else 1.0)
-        if force.any():
-            reactions.append(
-                ContactForce(
-                    step=t, vertex=contact.vertex, wall=contact.wall, point=contact.point, force=force
-                )
-            )
-    return reactions
+            fingers[t, c] = share.sum() * scaled.normal[t, f] + (share @ slopes) * scaled.tangent[t, f]
+        present = scaled.group[t] >= 0
+        reactions[t, present] = weights[each * len(on) :][: present.sum()]
+    return task.weight * fingers, contact_forces(task, reactions)

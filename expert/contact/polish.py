@@ -3,7 +3,8 @@
 Successive convex programs with the torque to first order, (p0 - q) x lambda + (p - p0) x lambda0; forces are recomputed
 exactly at the new positions and steps are halved until the true cost falls.  Any Karush-Kuhn-Tucker point of the task at
 fixed modes is a fixed point, and the minimiser of its own convex program.  Where these programs zigzag, because they do
-not see the curvature of the torque, Newton's method on the active constraints finishes.
+not see the curvature of the torque, Newton's method on the active constraints finishes.  Everything is without
+dimension, see `scaled`.
 """
 
 from dataclasses import dataclass
@@ -11,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from expert.contact.leaf import pushes
-from expert.contact.model import Model
+from expert.contact.box import pushes
 from expert.contact.plan_at import forces_at
+from expert.contact.scaled import ScaledTask
 from expert.contact.sequence import Sequence, nearest_region, standing_rows
 from expert.contact.steps import RIDGE, rays_per_end, solve_step, step_program
 from expert.geometry.pose import Array
@@ -55,15 +56,15 @@ class Polished:
     rounds: int
 
 
-def polish(model: Model, sequence: Sequence, z: Array) -> Polished:
+def polish(scaled: ScaledTask, sequence: Sequence, z: Array) -> Polished:
     """Stationary point reached downhill from z."""
-    forces = forces_at(model, sequence, z)
+    forces = forces_at(scaled, sequence, z)
     cost = forces.cost
     moves: list[float] = []
     while len(moves) < ROUNDS and not _stuck(moves):
-        program = first_order(model, sequence, z, forces.weights, settle_regions(model, sequence, z))
+        program = first_order(scaled, sequence, z, forces.weights, settle_regions(scaled, sequence, z))
         status, v, u = solve_qp(
-            program.H, program.g, program.A, program.b, program.equalities, 4 * model.iterations
+            program.H, program.g, program.A, program.b, program.equalities, 4 * scaled.iterations
         )
         if status != SOLVED:
             break
@@ -73,9 +74,9 @@ def polish(model: Model, sequence: Sequence, z: Array) -> Polished:
         steps = [z + 0.5**k * (v[: len(z)] - z) for k in range(HALVINGS)]
         if len(moves) > PATIENCE:
             here = np.concatenate([z, *_used(program, forces.weights)])
-            steps.insert(0, _inside(sequence, newton(model, sequence, program, here, u)[: len(z)]))
+            steps.insert(0, _inside(sequence, newton(scaled, sequence, program, here, u)[: len(z)]))
         for trial in steps:
-            reached = forces_at(model, sequence, trial)
+            reached = forces_at(scaled, sequence, trial)
             if reached.cost <= cost + 1e-13 * abs(cost):
                 z, cost, forces = trial, reached.cost, reached
                 break
@@ -84,21 +85,21 @@ def polish(model: Model, sequence: Sequence, z: Array) -> Polished:
     return Polished(z, cost, moves[-1] if moves else np.inf, len(moves))
 
 
-def mend(model: Model, sequence: Sequence, z: Array) -> tuple[Array, float]:
+def mend(scaled: ScaledTask, sequence: Sequence, z: Array) -> tuple[Array, float]:
     """A plan near positions that admit none: first-order programs from the forces that positions close by would take.
 
     Free fingers go to the region that they miss least.  Returns the positions and their cost, inf without success.
     """
-    weights = forces_around(model, sequence, z, AROUND)
+    weights = forces_around(scaled, sequence, z, AROUND)
     for _ in range(MENDINGS):
-        program = first_order(model, sequence, z, weights, settle_regions(model, sequence, z))
+        program = first_order(scaled, sequence, z, weights, settle_regions(scaled, sequence, z))
         status, v, _ = solve_qp(
-            program.H, program.g, program.A, program.b, program.equalities, 4 * model.iterations
+            program.H, program.g, program.A, program.b, program.equalities, 4 * scaled.iterations
         )
         if status != SOLVED:
             break
         before, z = z, _inside(sequence, v[: len(z)])
-        cost = forces_at(model, sequence, z).cost
+        cost = forces_at(scaled, sequence, z).cost
         if np.isfinite(cost):
             return z, cost
         if np.abs(z - before).max() <= STATIONARY:
@@ -110,16 +111,16 @@ def mend(model: Model, sequence: Sequence, z: Array) -> tuple[Array, float]:
 
 
 @compiled
-def forces_around(model: Model, sequence: Sequence, z: Array, distance: float) -> Array:
+def forces_around(scaled: ScaledTask, sequence: Sequence, z: Array, distance: float) -> Array:
     """Ray weights (T, N) of the least-cost forces with every rho free to move by `distance` at each step; 0: none."""
     T, C = sequence.modes.shape
-    each = rays_per_end(model)
-    weights = np.zeros((T, 3 * C + model.rays.shape[1]))
+    each = rays_per_end(scaled)
+    weights = np.zeros((T, 3 * C + scaled.rays.shape[1]))
     for t in range(T):
         on = pushes(sequence, t)
         lo = np.maximum(z[on] - distance, sequence.lo[on])
         hi = np.minimum(z[on] + distance, sequence.hi[on])
-        status, _, _, _, x = solve_step(model, t, sequence.facet[on], lo, hi)
+        status, _, _, _, x = solve_step(scaled, t, sequence.facet[on], lo, hi)
         if status == SOLVED:
             k = 0
             for i in range(on.size):
@@ -147,34 +148,36 @@ def _inside(sequence: Sequence, z: Array) -> Array:
 
 
 @compiled
-def settle_regions(model: Model, sequence: Sequence, z: Array) -> IntArray:
+def settle_regions(scaled: ScaledTask, sequence: Sequence, z: Array) -> IntArray:
     """Region with most room around each free finger, (T, C); -1 elsewhere."""
     assigned = np.full(sequence.modes.shape, -1)
     for t in range(assigned.shape[0]):
         for c in range(assigned.shape[1]):
             v = sequence.free[t, c]
             if v >= 0:
-                assigned[t, c], _ = nearest_region(model, t, z[v], z[v + 1])
+                assigned[t, c], _ = nearest_region(scaled, t, z[v], z[v + 1])
     return assigned
 
 
 @compiled
-def first_order(model: Model, sequence: Sequence, z: Array, weights: Array, assigned: IntArray) -> Program:
+def first_order(
+    scaled: ScaledTask, sequence: Sequence, z: Array, weights: Array, assigned: IntArray
+) -> Program:
     """The convex program with the torque expanded to first order at z and its forces; both are held by a proximal term."""
-    T, n, each = len(sequence.modes), z.size, rays_per_end(model)
-    standing, side = standing_rows(model, sequence, sequence.lo, sequence.hi, assigned, n)
+    T, n, each = len(sequence.modes), z.size, rays_per_end(scaled)
+    standing, side = standing_rows(scaled, sequence, sequence.lo, sequence.hi, assigned, n)
     first, torque = np.full(T + 1, n), np.full(T, -1)
     balances, rows = 0, side.size
     for t in range(T):
         on = pushes(sequence, t)
-        _, g, _, b = step_program(model, t, sequence.facet[on], z[on], z[on])
+        _, g, _, b = step_program(scaled, t, sequence.facet[on], z[on], z[on])
         first[t + 1] = first[t] + g.size
         if g.size > 0:
             balances, rows = balances + 3, rows + b.size
     width = first[T]
     H, g, A, b = np.zeros((width, width)), np.zeros(width), np.zeros((rows, width)), np.zeros(rows)
     H[:n, :n] = sequence.Q
-    proximal = PROXIMAL * (1 + model.acceleration_weight)
+    proximal = PROXIMAL * (1 + scaled.acceleration_weight)
     for i in range(n):
         H[i, i] += proximal
         g[i] = sequence.q[i] - proximal * z[i]
@@ -183,7 +186,7 @@ def first_order(model: Model, sequence: Sequence, z: Array, weights: Array, assi
     top, row = 0, balances + side.size
     for t in range(T):
         on = pushes(sequence, t)
-        h, c, a, s = step_program(model, t, sequence.facet[on], z[on], z[on])
+        h, c, a, s = step_program(scaled, t, sequence.facet[on], z[on], z[on])
         if c.size == 0:
             continue
         span = slice(first[t], first[t + 1])
@@ -193,7 +196,7 @@ def first_order(model: Model, sequence: Sequence, z: Array, weights: Array, assi
         b[top : top + 3] = s[:3]
         torque[t] = top + 2
         for i in range(on.size):
-            arm = model.length[sequence.facet[on[i]]] * weights[t, each * i : each * (i + 1)].sum()
+            arm = scaled.length[sequence.facet[on[i]]] * weights[t, each * i : each * (i + 1)].sum()
             A[top + 2, on[i]] += arm
             b[top + 2] += arm * z[on[i]]
         A[row : row + s.size - 3, span] = a[3:]
@@ -202,11 +205,11 @@ def first_order(model: Model, sequence: Sequence, z: Array, weights: Array, assi
     return Program(H, g, A, b, balances, first, torque)
 
 
-def newton(model: Model, sequence: Sequence, program: Program, v: Array, u: Array) -> Array:
+def newton(scaled: ScaledTask, sequence: Sequence, program: Program, v: Array, u: Array) -> Array:
     """One Newton step from v on the constraints that the convex program's multipliers u find active, curved torque included."""
     active = np.arange(len(u)) < program.equalities
     active |= u > 1e-10 * max(1.0, np.abs(u).max(initial=0.0))
-    bent = curvature(model, sequence, program, u)
+    bent = curvature(scaled, sequence, program, u)
     A = program.A[active]
     dependent = -1e-12 * np.eye(len(A))  # active constraints may depend on one another
     matrix = np.block([[program.H + bent, A.T], [A, dependent]])
@@ -217,11 +220,11 @@ def newton(model: Model, sequence: Sequence, program: Program, v: Array, u: Arra
         return v
 
 
-def curvature(model: Model, sequence: Sequence, program: Program, u: Array) -> Array:
+def curvature(scaled: ScaledTask, sequence: Sequence, program: Program, u: Array) -> Array:
     """Second derivative of the Lagrangian's torque terms, -u_tau l d(rho) d(lambda_n)."""
-    bent, each = np.zeros_like(program.H), rays_per_end(model)
+    bent, each = np.zeros_like(program.H), rays_per_end(scaled)
     for t, row in enumerate(program.torque):
         for i, k in enumerate(pushes(sequence, t)):
             rays = program.first[t] + np.arange(each * i, each * (i + 1))
-            bent[k, rays] -= u[row] * model.length[sequence.facet[k]]
+            bent[k, rays] -= u[row] * scaled.length[sequence.facet[k]]
     return bent + bent.T

@@ -1,128 +1,174 @@
-"""A contact task in units of the object's size L, its weight m g and m g L, as arrays for the mixed-integer models."""
+"""A contact task as arrays without dimension, which all methods read: length L (object size), force m g, torque m g L."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from expert.geometry.convex import free_regions
-from expert.geometry.pose import Array, rotation, to_world
-from expert.mechanics import ExternalContact, external_contacts, friction_rays, required_wrench, wrench_about
-from expert.problems.contact import ContactTask
+from expert.geometry.pose import Array
+from expert.mechanics import (
+    ExternalContact,
+    external_contacts,
+    friction_rays,
+    parking_place,
+    region_rows,
+    required_wrench,
+    rho_limits,
+    wall_rows,
+    workspace,
+    wrench_about,
+)
+from expert.problems.contact import SUPPORT, ContactTask
+from expert.world.values import IntArray
+
+QP_ITERATIONS = 400
+"""Changes of the active set after which the compiled QP solver hands over to others."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class ScaledTask:
-    """Dimensionless data of Thesis 3.1.2.  Indices: t step, c finger, f facet, j end point, k ray, r region, h side.
+class ScaledTask(NamedTuple):
+    """Data of Thesis 3.1.2 for models and compiled code.  t step, f facet, e ray of the environment, g group of rays, h half-plane.
 
-    centres (t, d); levers (t, f, j, d): facet end points relative to the centre of mass; rays (t, f, k, d) with unit
-    normal component; required (t, 3): wrench that fingers and reactions together exert; reactions (t, 3, i): wrench of environment
-    ray i, scaled to unit length; reaction_rows (e, i), reaction_limits (e,): limits on the sum over each contact.
-    region_A (t, r, h, d), region_b (t, r, h): free space A p <= b with clearance; wall_A (w, d), wall_b (w,): for every
-    finger.  workspace (2, d): the box of finger positions.  Costs are in (m g)^2.
+    origin (2,) [m]: the first centre of mass, zero of all positions; length L [m], weight m g [N].
+    centre (T, 2); arm (T, F, 2) from the centre of mass to end point a, edge (T, F, 2) = b - a, lengths (F,);
+    normal, tangent (T, F, 2); low, high (T, F): range of rho that margins and walls leave.
+    required (T, 3): wrench that fingers and reactions together exert; rays (T, E, 3) wrenches of the environment, group (T, E) of each,
+    -1 for none; limit (T, G) of each group's sum.
+    walls (W, 3): n.x >= d;  region (T, R, H, 3): a.x <= b, padded with 0.x <= 1.
+    friction is the share of true_friction that is planned with; margin_weight times mu lambda_n - |lambda_t| (true mu) is
+    the reward for the distance from the cone's edge (beta).
+    parking (2,): where a finger that never touches waits; nan: nowhere stays free all the time.
+    workspace (2, d): the box of finger positions.
     """
 
-    length: float
+    origin: Array
+    size: float
     weight: float
-    centres: Array
-    levers: Array
-    rays: Array
+    centre: Array
+    arm: Array
+    edge: Array
+    length: Array
+    normal: Array
+    tangent: Array
+    low: Array
+    high: Array
     required: Array
-    contacts: tuple[ExternalContact, ...]
-    reactions: Array
-    reaction_rows: Array
-    reaction_limits: Array
-    region_A: Array
-    region_b: Array
-    wall_A: Array
-    wall_b: Array
-    workspace: Array
+    rays: Array
+    group: IntArray
+    limit: Array
+    walls: Array
+    region: Array
+    parking: Array
+    friction: float
+    true_friction: float
     max_force: float
     min_force: float
-    force_cost: float
-    acceleration_cost: float
-    margin_cost: float
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """Steps T, facets F, regions R."""
-        return len(self.centres), self.levers.shape[1], self.region_A.shape[1]
+    force_weight: float
+    acceleration_weight: float
+    margin_weight: float
+    min_interval: int
+    workspace: Array
+    iterations: int
 
     @classmethod
     def of(cls, task: ContactTask) -> "ScaledTask":
-        """Scale a task."""
+        """Scale the task: lengths by L, forces by m g, the cost by 1 / (m g)^2."""
         L, weight = task.body.size, task.weight
-        q = task.trajectory.poses
-        everything = external_contacts(task)
-        contacts = tuple(c for c in everything if not c.fixed and c.rays.any())
-        region_A, region_b = _regions(task)
-        walls = task.environment.walls
-        wall_A = np.array([-w.normal for w in walls]).reshape(-1, 2)
-        wall_b = np.array([-(w.normal @ w.point) - task.fingers.clearance for w in walls])
-        normal, _ = task.body.frames_w(q)
+        poses = task.trajectory.poses
+        origin = poses[0, :2].copy()
+        a, b = task.body.facets_w(poses)
+        normal, tangent = task.body.frames_w(poses)
+        contacts = external_contacts(task)
+        low, high = rho_limits(task, a, b)
+        rays, group, limit = environment_rays(task, contacts)
+        mu = task.fingers.friction
         return cls(
-            length=L,
+            origin=origin,
+            size=L,
             weight=weight,
-            centres=q[:, :2] / L,
-            levers=(np.stack(task.body.facets_w(q), axis=2) - q[:, None, None, :2]) / L,
-            rays=friction_rays(normal, task.robustness.cone_fraction * task.fingers.friction),
-            required=required_wrench(task, everything) / [weight, weight, weight * L],
-            contacts=contacts,
-            **_reactions(task, contacts),
-            region_A=region_A,
-            region_b=region_b / L,
-            wall_A=wall_A,
-            wall_b=wall_b / L,
-            workspace=_workspace(task) / L,
+            centre=(poses[:, :2] - origin) / L,
+            arm=(a - poses[:, None, :2]) / L,
+            edge=(b - a) / L,
+            length=np.linalg.norm(b[0] - a[0], axis=-1) / L,
+            normal=normal,
+            tangent=tangent,
+            low=low,
+            high=high,
+            required=required_wrench(task, contacts) / [weight, weight, weight * L],
+            rays=rays,
+            group=group,
+            limit=limit,
+            walls=_from(origin, wall_rows(task)) / [1, 1, L],
+            region=_from(origin, region_rows(task)) / [1, 1, L],
+            parking=(parking_place(task) - origin) / L,
+            friction=task.robustness.cone_fraction * mu,
+            true_friction=mu,
             max_force=task.fingers.max_force / weight,
             min_force=task.robustness.min_normal_force / weight,
-            force_cost=task.cost.force,
-            acceleration_cost=task.cost.acceleration * (L / task.trajectory.dt**2 / weight) ** 2,
-            margin_cost=task.cost.margin / weight,
+            force_weight=task.cost.force,
+            acceleration_weight=task.cost.acceleration * (L / task.trajectory.dt**2 / weight) ** 2,
+            margin_weight=task.cost.margin / weight / np.hypot(1, mu),
+            min_interval=task.robustness.min_interval,
+            workspace=(workspace(task) - origin) / L,
+            iterations=QP_ITERATIONS,
         )
 
+    @property
+    def steps(self) -> int:
+        """T."""
+        return len(self.required)
 
-def _reactions(task: ContactTask, contacts: tuple[ExternalContact, ...]) -> dict[str, Array]:
-    """Wrenches of all environment rays, scaled to unit length; which contact each belongs to; the contacts' limits."""
-    q = task.trajectory.poses
-    count = max(1, sum(len(c.rays) for c in contacts))  # without contacts: one ray that can exert nothing
-    wrenches, rows = np.zeros((task.steps, 3, count)), np.zeros((max(1, len(contacts)), count))
-    limits = np.zeros(len(rows))
-    arm = np.array([1.0, 1.0, task.body.size])
-    first = 0
-    for e, c in enumerate(contacts):
-        columns = slice(first, first := first + len(c.rays))
-        wrenches[c.step, :, columns] = (wrench_about(c.rays / ray_size(c), c.point, q[c.step, :2]) / arm).T
-        rows[e, columns], limits[e] = 1.0, c.limit * ray_size(c) / task.weight
-    return {"reactions": wrenches, "reaction_rows": rows, "reaction_limits": limits}
+    @property
+    def facets(self) -> int:
+        """F."""
+        return len(self.length)
 
-
-def ray_size(contact: ExternalContact) -> float:
-    """Length of the longest ray: near 1 for walls, [N] for the support plane."""
-    return float(np.linalg.norm(contact.rays, axis=1).max())
+    @property
+    def regions(self) -> int:
+        """R."""
+        return self.region.shape[1]
 
 
-def _regions(task: ContactTask) -> tuple[Array, Array]:
-    """Free space (t, r, h, d), (t, r, h) [m] around the object, grown by the clearance, and clear of walls.
-
-    Sides are padded with 0 p <= 1.
-    """
-    regions = free_regions(task.body.vertices, task.robustness.free_clearance)
-    sides = max(len(r.b) for r in regions)
-    A_b, b_b = np.zeros((len(regions), sides, 2)), np.ones((len(regions), sides))
-    for k, region in enumerate(regions):
-        A_b[k, : len(region.b)], b_b[k, : len(region.b)] = region.A, region.b
-    q = task.trajectory.poses
-    turn = rotation(q[:, 2])
-    A = np.einsum("tde,rhe->trhd", turn, A_b)
-    return A, b_b + np.einsum("trhd,td->trh", A, q[:, :2])
+def _from(origin: Array, rows: Array) -> Array:
+    """Rows (n, d) of n.x against d, with x counted from `origin`."""
+    shifted = rows.copy()
+    shifted[..., 2] -= rows[..., :2] @ origin
+    return shifted
 
 
-def _workspace(task: ContactTask) -> Array:
-    """Box (2, d) [m] for finger positions: what the object sweeps, and beyond it the reach of a finger that
-    leaves at the speed of the fastest vertex and is never slowed down (more would cost acceleration for nothing)."""
-    vertices = to_world(task.trajectory.poses, task.body.vertices)
-    fastest = np.linalg.norm(np.diff(vertices, axis=0), axis=2).max()
-    reach = (
-        task.body.size + task.steps * fastest + max(task.fingers.clearance, task.robustness.free_clearance)
-    )
-    return np.stack([vertices.min(axis=(0, 1)) - reach, vertices.max(axis=(0, 1)) + reach])
+def environment_rays(
+    task: ContactTask, contacts: tuple[ExternalContact, ...]
+) -> tuple[Array, IntArray, Array]:
+    """Wrenches of the rays that walls and support may choose from, their groups and limits; walls in units of m g (3-CT6)."""
+    L, weight = task.body.size, task.weight
+    lists: list[list[tuple[Array, int]]] = [[] for _ in range(task.steps)]
+    limits: list[list[float]] = [[] for _ in range(task.steps)]
+    for c in contacts:
+        if c.fixed:
+            continue
+        scale, most = (weight, 1.0) if c.wall == SUPPORT else (1.0, c.limit / weight)
+        arm = (c.point - task.trajectory.poses[c.step, :2]) / L
+        for ray in c.rays / scale:
+            lists[c.step].append((wrench_about(ray, arm, np.zeros(2)), len(limits[c.step])))
+        limits[c.step].append(most)
+    E, G = max(1, *map(len, lists)), max(1, *map(len, limits))
+    rays, group = np.zeros((task.steps, E, 3)), np.full((task.steps, E), -1)
+    limit = np.zeros((task.steps, G))
+    for t, entries in enumerate(lists):
+        for e, (ray, g) in enumerate(entries):
+            rays[t, e], group[t, e] = ray, g
+        limit[t, : len(limits[t])] = limits[t]
+    return rays, group, limit
+
+
+def finger_rays(scaled: ScaledTask) -> Array:
+    """Edges (T, F, 2 rays, d) of the fingers' cones, of unit normal component (3-CT3)."""
+    return friction_rays(scaled.normal, scaled.friction)
+
+
+def end_points(scaled: ScaledTask) -> Array:
+    """Facets' end points relative to the centre of mass, (T, F, j, d)."""
+    return np.stack([scaled.arm, scaled.arm + scaled.edge], axis=2)
+
+
+def belonging(scaled: ScaledTask) -> Array:
+    """1 where a ray of the environment belongs to a group, (T, E, G)."""
+    return (scaled.group[..., None] == np.arange(scaled.limit.shape[1])).astype(float)

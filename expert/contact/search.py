@@ -6,16 +6,16 @@ the heap bounds the task, so (best - bound) / best certifies the answer.
 """
 
 import heapq
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from expert.contact.leaf import Relaxed, narrow, relax
-from expert.contact.model import Model
+from expert.budget import Budget
+from expert.contact.box import Relaxed, narrow, relax
 from expert.contact.modes import Moves, cost_to_go, last_costs, moves_of, step_costs, window_costs
 from expert.contact.polish import mend
+from expert.contact.scaled import ScaledTask
 from expert.contact.sequence import Sequence, least_smoothing, sequence_of
 from expert.geometry.pose import Array
 from expert.problems.contact import FREE
@@ -53,7 +53,7 @@ class Leaf:
 
 @dataclass
 class Best:
-    """The incumbent, in units of 1 (cost of the model)."""
+    """The incumbent, in units of 1 (cost of the scaled)."""
 
     cost: float = np.inf
     sequence: Sequence | None = None
@@ -73,8 +73,8 @@ class Outcome:
 class Tree:
     """Complete mode sequences, visited best first; whoever grows it says which (`Search`: all of them)."""
 
-    def __init__(self, model: Model, fingers: int, gap: float) -> None:
-        self.model, self.fingers, self.gap = model, fingers, gap
+    def __init__(self, scaled: ScaledTask, fingers: int, gap: float) -> None:
+        self.scaled, self.fingers, self.gap = scaled, fingers, gap
         self.best, self.nodes = Best(), 0
         self.heap: list[tuple[float, int, Prefix | Leaf]] = []
         self.pushed = 0
@@ -86,10 +86,10 @@ class Tree:
         best = self.best.cost
         return best - max(self.gap * abs(best), NEGLIGIBLE) if np.isfinite(best) else np.inf
 
-    def run(self, *, node_limit: int | None, deadline: float) -> Outcome:
+    def run(self, budget: Budget, node_limit: int | None = None) -> Outcome:
         """Search until the gap closes, the tree is empty or a budget is spent."""
         while self.heap and self.heap[0][0] < self.cutoff:
-            if time.perf_counter() > deadline or (node_limit is not None and self.nodes >= node_limit):
+            if budget.over or (node_limit is not None and self.nodes >= node_limit):
                 return self._outcome(limited=True)
             bound, _, node = heapq.heappop(self.heap)
             self._open(bound, node)
@@ -130,7 +130,7 @@ class Tree:
 
     def _relax(self, leaf: Leaf) -> Relaxed:
         found = relax(
-            self.model, leaf.sequence, leaf.lo, leaf.hi, leaf.assigned, self.cutoff, self.gap / 2, ROUNDS
+            self.scaled, leaf.sequence, leaf.lo, leaf.hi, leaf.assigned, self.cutoff, self.gap / 2, ROUNDS
         )
         if found.cost < self.best.cost:
             self.best = Best(found.cost, leaf.sequence, found.z)
@@ -138,14 +138,14 @@ class Tree:
 
     def _mend(self, leaf: Leaf, z: Array) -> None:
         """A plan early: near the relaxation's solution, which has a finger inside the object or a step out of balance."""
-        z, cost = mend(self.model, leaf.sequence, z)
+        z, cost = mend(self.scaled, leaf.sequence, z)
         if cost < self.best.cost:
             self.best = Best(cost, leaf.sequence, z)
 
     def _children(self, bound: float, leaf: Leaf, found: Relaxed) -> Iterator[tuple[float, Leaf]]:
         t, c, depth = found.intrusion
         if depth > 0:
-            for region in range(self.model.region.shape[1]):
+            for region in range(self.scaled.region.shape[1]):
                 assigned = leaf.assigned.copy()
                 assigned[t, c] = region
                 apart = found.forces + self._assigned_smoothing(leaf.sequence.modes, assigned)
@@ -167,7 +167,7 @@ class Tree:
 
     def _assigned_smoothing(self, modes: IntArray, assigned: IntArray) -> float:
         return sum(
-            least_smoothing(self.model, modes[:, c : c + 1].copy(), assigned[:, c : c + 1].copy())[0]
+            least_smoothing(self.scaled, modes[:, c : c + 1].copy(), assigned[:, c : c + 1].copy())[0]
             for c in range(self.fingers)
         )
 
@@ -175,21 +175,21 @@ class Tree:
 class Search(Tree):
     """The tree of all mode sequences, grown from prefixes, and its tables for one task."""
 
-    def __init__(self, model: Model, fingers: int, gap: float) -> None:
-        super().__init__(model, fingers, gap)
-        self.moves: Moves = moves_of(model.facets, fingers, model.min_interval)
-        self.phi = step_costs(model, fingers)
-        self.windows = window_costs(model)
-        self.to_go = cost_to_go(self.phi, self.windows, self.moves, last_costs(model, self.phi, self.moves))
+    def __init__(self, scaled: ScaledTask, fingers: int, gap: float) -> None:
+        super().__init__(scaled, fingers, gap)
+        self.moves: Moves = moves_of(scaled.facets, fingers, scaled.min_interval)
+        self.phi = step_costs(scaled, fingers)
+        self.windows = window_costs(scaled)
+        self.to_go = cost_to_go(self.phi, self.windows, self.moves, last_costs(scaled, self.phi, self.moves))
         self.smoothing: dict[tuple[int, ...], float] = {}
 
-    def run(self, *, node_limit: int | None, deadline: float) -> Outcome:
+    def run(self, budget: Budget, node_limit: int | None = None) -> Outcome:
         """Search until the gap closes, the tree is empty or a budget is spent."""
         states = self.moves.states
         starts = np.flatnonzero(((states == 0) | (states % 3 == 1)).all(axis=1))  # free, or just arrived
         for s in reversed(starts):  # of equals the last is expanded first: fingers without use stay free
             self._push_prefix((), int(s), 0.0, 0.0)
-        return super().run(node_limit=node_limit, deadline=deadline)
+        return super().run(budget, node_limit)
 
     def _open(self, bound: float, node: Prefix | Leaf) -> None:
         if isinstance(node, Prefix):
@@ -218,7 +218,7 @@ class Search(Tree):
         if not node.settled and settled > bound * (1 + 1e-9) + 1e-12:
             return self._push(settled, Prefix(node.modes, node.state, node.forces, settled=True))
         self.nodes += 1
-        if t == self.model.steps - 1:
+        if t == self.scaled.steps - 1:
             return self._plant(settled, node)
         for k in reversed(range(self.moves.start[node.state], self.moves.start[node.state + 1])):
             forces = node.forces + float(self.phi[t, self.moves.active[k]])
@@ -233,11 +233,11 @@ class Search(Tree):
         return self.smoothing[modes]
 
     def _outside(self, column: IntArray, assigned: IntArray, limit: float) -> float:
-        bound, t = least_smoothing(self.model, column, assigned)
+        bound, t = least_smoothing(self.scaled, column, assigned)
         if t < 0 or bound >= limit:
             return bound
         least = limit
-        for region in range(self.model.region.shape[1]):
+        for region in range(self.scaled.region.shape[1]):
             assigned[t, 0] = region
             least = min(least, max(bound, self._outside(column, assigned, least)))
         assigned[t, 0] = -1
@@ -245,7 +245,7 @@ class Search(Tree):
 
     def _plant(self, bound: float, node: Prefix) -> None:
         """Visit a complete sequence with its box narrowed to where every step can be balanced, if there is such a box."""
-        sequence = sequence_of(self.model, np.array(node.modes).T.copy())
+        sequence = sequence_of(self.scaled, np.array(node.modes).T.copy())
         lo, hi = sequence.lo.copy(), sequence.hi.copy()
-        if narrow(self.model, sequence, lo, hi):
+        if narrow(self.scaled, sequence, lo, hi):
             self._visit(bound, Leaf(sequence, lo, hi, np.full_like(sequence.modes, -1)))

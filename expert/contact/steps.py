@@ -3,12 +3,13 @@
 A finger on a facet with rho in [lo, hi] exerts every wrench of the cone spanned by its friction rays at both ends, and
 no other: with w = rho lambda_n the cone is convex (Thesis 3-CT2 to 3-CT4 without an envelope).  For any multipliers y of
 the wrench balance, D(y) = y.required - max_environment - sum_c max_finger is a lower bound of the step's cost, evaluated
-in closed form; the tolerance of the program's solver therefore never enters a bound.
+in closed form; the tolerance of the program's solver therefore never enters a bound.  All quantities are without
+dimension, see `scaled`.
 """
 
 import numpy as np
 
-from expert.contact.model import Model
+from expert.contact.scaled import ScaledTask
 from expert.geometry.pose import Array
 from expert.numeric.qp import FAILED, INFEASIBLE, SOLVED, compiled, solve_qp
 from expert.world.values import IntArray
@@ -22,171 +23,171 @@ CERTAIN = 1e-9
 
 
 @compiled
-def seen(model: Model, t: int, f: int, rho: float, y: Array) -> tuple[float, float]:
+def seen(scaled: ScaledTask, t: int, f: int, rho: float, y: Array) -> tuple[float, float]:
     """Multipliers y as normal and tangential gain of a force at rho: y.wrench = z_n lambda_n + z_t lambda_t."""
-    dx = model.arm[t, f, 0] + rho * model.edge[t, f, 0]
-    dy = model.arm[t, f, 1] + rho * model.edge[t, f, 1]
+    dx = scaled.arm[t, f, 0] + rho * scaled.edge[t, f, 0]
+    dy = scaled.arm[t, f, 1] + rho * scaled.edge[t, f, 1]
     zx, zy = y[0] - y[2] * dy, y[1] + y[2] * dx
-    n, tau = model.normal[t, f], model.tangent[t, f]
+    n, tau = scaled.normal[t, f], scaled.tangent[t, f]
     return zx * n[0] + zy * n[1], zx * tau[0] + zy * tau[1]
 
 
 @compiled
-def gain(model: Model, t: int, f: int, rho: float, y: Array) -> float:
+def gain(scaled: ScaledTask, t: int, f: int, rho: float, y: Array) -> float:
     """h(rho) = max over the friction cone of y.wrench - |lambda|^2 + margin term.  Convex in rho."""
-    zn, zt = seen(model, t, f, rho, y)
-    mu, weight = model.friction, model.force_weight
-    zn, zt = zn + model.margin_weight * model.true_friction, max(abs(zt) - model.margin_weight, 0.0)
+    zn, zt = seen(scaled, t, f, rho, y)
+    mu, weight = scaled.friction, scaled.force_weight
+    zn, zt = zn + scaled.margin_weight * scaled.true_friction, max(abs(zt) - scaled.margin_weight, 0.0)
     edge = (zn + mu * zt) / max(2 * weight * (1 + mu * mu), 1e-300)
     normal = zn / max(2 * weight, 1e-300) if mu * mu * zn >= zt * mu else edge
-    normal = min(max(normal, model.min_force), model.max_force)
+    normal = min(max(normal, scaled.min_force), scaled.max_force)
     tangential = min(zt / max(2 * weight, 1e-300), mu * normal)
     return zn * normal + zt * tangential - weight * (normal * normal + tangential * tangential)
 
 
 @compiled
-def reach(model: Model, t: int, f: int, rho: float, y: Array) -> float:
+def reach(scaled: ScaledTask, t: int, f: int, rho: float, y: Array) -> float:
     """max over the friction cone of y.wrench.  Convex in rho."""
-    zn, zt = seen(model, t, f, rho, y)
-    most = zn + model.friction * abs(zt)
-    return most * (model.max_force if most > 0 else model.min_force)
+    zn, zt = seen(scaled, t, f, rho, y)
+    most = zn + scaled.friction * abs(zt)
+    return most * (scaled.max_force if most > 0 else scaled.min_force)
 
 
 @compiled
-def environment_reach(model: Model, t: int, y: Array) -> float:
+def environment_reach(scaled: ScaledTask, t: int, y: Array) -> float:
     """max over what walls and support can exert of y.wrench."""
     total, group, best = 0.0, -1, 0.0
-    for e in range(model.rays.shape[1]):
-        g = model.group[t, e]
+    for e in range(scaled.rays.shape[1]):
+        g = scaled.group[t, e]
         if g != group:
             if group >= 0:
-                total += best * model.limit[t, group]
+                total += best * scaled.limit[t, group]
             group, best = g, 0.0
         if g < 0:
             break
-        ray = model.rays[t, e]
+        ray = scaled.rays[t, e]
         best = max(best, ray[0] * y[0] + ray[1] * y[1] + ray[2] * y[2])
     if group >= 0:
-        total += best * model.limit[t, group]
+        total += best * scaled.limit[t, group]
     return total
 
 
 @compiled
-def cost_bound(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, y: Array) -> float:
+def cost_bound(scaled: ScaledTask, t: int, facets: IntArray, lo: Array, hi: Array, y: Array) -> float:
     """D(y): no wrench balance with these facets costs less."""
-    bound = model.required[t] @ y - environment_reach(model, t, y)
+    bound = scaled.required[t] @ y - environment_reach(scaled, t, y)
     for i in range(facets.size):
-        low, high = gain(model, t, facets[i], lo[i], y), gain(model, t, facets[i], hi[i], y)
+        low, high = gain(scaled, t, facets[i], lo[i], y), gain(scaled, t, facets[i], hi[i], y)
         bound -= max(low, high)
     return bound
 
 
 @compiled
-def shortfall(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, y: Array) -> float:
+def shortfall(scaled: ScaledTask, t: int, facets: IntArray, lo: Array, hi: Array, y: Array) -> float:
     """Positive: no wrench balance exists with these facets, and y proves it."""
-    miss = model.required[t] @ y - environment_reach(model, t, y)
+    miss = scaled.required[t] @ y - environment_reach(scaled, t, y)
     for i in range(facets.size):
-        miss -= max(reach(model, t, facets[i], lo[i], y), reach(model, t, facets[i], hi[i], y))
+        miss -= max(reach(scaled, t, facets[i], lo[i], y), reach(scaled, t, facets[i], hi[i], y))
     return miss
 
 
 @compiled
-def rays_per_end(model: Model) -> int:
+def rays_per_end(scaled: ScaledTask) -> int:
     """Rays of a finger at one rho: both edges of its cone, and the normal where the margin is rewarded."""
-    return 3 if model.margin_weight > 0 else 2
+    return 3 if scaled.margin_weight > 0 else 2
 
 
 @compiled
 def step_program(
-    model: Model, t: int, facets: IntArray, lo: Array, hi: Array
+    scaled: ScaledTask, t: int, facets: IntArray, lo: Array, hi: Array
 ) -> tuple[Array, Array, Array, Array]:
     """H, g, A, b of the step's program over ray weights x >= 0: the wrench balance, x >= 0, limits of force.
 
     Rays: those of each finger at lo, and at hi where that differs; then the environment's.
     """
-    each = rays_per_end(model)
+    each = rays_per_end(scaled)
     count = 0
     for i in range(facets.size):
         count += each if lo[i] == hi[i] else 2 * each
     env, groups = 0, 0
-    while env < model.rays.shape[1] and model.group[t, env] >= 0:
-        groups = model.group[t, env] + 1
+    while env < scaled.rays.shape[1] and scaled.group[t, env] >= 0:
+        groups = scaled.group[t, env] + 1
         env += 1
     n = count + env
-    limits = facets.size * (2 if model.min_force > 0 else 1)
+    limits = facets.size * (2 if scaled.min_force > 0 else 1)
     m = 3 + n + limits + groups
     H, g, A, b = np.zeros((n, n)), np.zeros(n), np.zeros((m, n)), np.zeros(m)
     force = np.zeros((2, n))
     k, row = 0, 3 + n
     for i in range(facets.size):
         f, first = facets[i], k
-        normal, tangent = model.normal[t, f], model.tangent[t, f]
+        normal, tangent = scaled.normal[t, f], scaled.tangent[t, f]
         for end in range(1 if lo[i] == hi[i] else 2):
             rho = lo[i] if end == 0 else hi[i]
-            dx = model.arm[t, f, 0] + rho * model.edge[t, f, 0]
-            dy = model.arm[t, f, 1] + rho * model.edge[t, f, 1]
+            dx = scaled.arm[t, f, 0] + rho * scaled.edge[t, f, 0]
+            dy = scaled.arm[t, f, 1] + rho * scaled.edge[t, f, 1]
             for j in range(each):
-                slope = (model.friction, -model.friction, 0.0)[j]
+                slope = (scaled.friction, -scaled.friction, 0.0)[j]
                 fx, fy = normal[0] + slope * tangent[0], normal[1] + slope * tangent[1]
                 force[0, k], force[1, k] = fx, fy
                 A[0, k], A[1, k], A[2, k] = fx, fy, dx * fy - dy * fx
-                g[k] = -model.margin_weight * (model.true_friction - abs(slope))
+                g[k] = -scaled.margin_weight * (scaled.true_friction - abs(slope))
                 k += 1
         for p in range(first, k):
             for q in range(first, k):
-                H[p, q] = 2 * model.force_weight * (force[0, p] * force[0, q] + force[1, p] * force[1, q])
-        A[row, first:k], b[row] = -1.0, -model.max_force
+                H[p, q] = 2 * scaled.force_weight * (force[0, p] * force[0, q] + force[1, p] * force[1, q])
+        A[row, first:k], b[row] = -1.0, -scaled.max_force
         row += 1
-        if model.min_force > 0:
-            A[row, first:k], b[row] = 1.0, model.min_force
+        if scaled.min_force > 0:
+            A[row, first:k], b[row] = 1.0, scaled.min_force
             row += 1
     for e in range(env):
         for d in range(3):
-            A[d, count + e] = model.rays[t, e, d]
-        A[row + model.group[t, e], count + e] = -1.0
+            A[d, count + e] = scaled.rays[t, e, d]
+        A[row + scaled.group[t, e], count + e] = -1.0
     for p in range(groups):
-        b[row + p] = -model.limit[t, p]
+        b[row + p] = -scaled.limit[t, p]
     for k in range(n):
         H[k, k] += RIDGE
         A[3 + k, k] = 1.0
-    b[:3] = model.required[t]
+    b[:3] = scaled.required[t]
     return H, g, A, b
 
 
 @compiled
 def solve_step(
-    model: Model, t: int, facets: IntArray, lo: Array, hi: Array
+    scaled: ScaledTask, t: int, facets: IntArray, lo: Array, hi: Array
 ) -> tuple[int, float, float, Array, Array]:
     """Status, cost reached, lower bound, multipliers y (a proof where infeasible), ray weights x.
 
     INFEASIBLE only with a proof that `shortfall` confirms; FAILED leaves the bound of y = 0 and no more.
     """
-    H, g, A, b = step_program(model, t, facets, lo, hi)
+    H, g, A, b = step_program(scaled, t, facets, lo, hi)
     y = np.zeros(3)
     if g.size == 0:
-        size = np.abs(model.required[t]).max()
+        size = np.abs(scaled.required[t]).max()
         if size <= CERTAIN:
             return SOLVED, 0.0, 0.0, y, g
-        y[:] = model.required[t] / size
+        y[:] = scaled.required[t] / size
         return INFEASIBLE, np.inf, np.inf, y, g
-    status, x, u = solve_qp(H, g, A, b, np.int64(3), model.iterations)
+    status, x, u = solve_qp(H, g, A, b, np.int64(3), scaled.iterations)
     y[:] = u[:3]
     if status == SOLVED:
         cost = float(0.5 * x @ (H @ x) - 0.5 * RIDGE * (x @ x) + g @ x)
-        trivial = cost_bound(model, t, facets, lo, hi, np.zeros(3))
-        return SOLVED, cost, max(trivial, cost_bound(model, t, facets, lo, hi, y)), y, x
+        trivial = cost_bound(scaled, t, facets, lo, hi, np.zeros(3))
+        return SOLVED, cost, max(trivial, cost_bound(scaled, t, facets, lo, hi, y)), y, x
     if status == INFEASIBLE:
         length = np.sqrt(y @ y)
         if length > 0:
             y /= length
-            if shortfall(model, t, facets, lo, hi, y) > CERTAIN:
+            if shortfall(scaled, t, facets, lo, hi, y) > CERTAIN:
                 return INFEASIBLE, np.inf, np.inf, y, x
     y[:] = 0.0
-    return FAILED, np.inf, cost_bound(model, t, facets, lo, hi, y), y, x
+    return FAILED, np.inf, cost_bound(scaled, t, facets, lo, hi, y), y, x
 
 
 @compiled
-def tighten(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, i: int, end: int) -> bool:
+def tighten(scaled: ScaledTask, t: int, facets: IntArray, lo: Array, hi: Array, i: int, end: int) -> bool:
     """Move lo[i] (end 0) or hi[i] (end 1) in towards the first rho that admits a wrench balance.  False: there is none.
 
     First by certificates: multipliers that prove one rho hopeless rule out its neighbours too.  Then by bisection: the
@@ -198,23 +199,23 @@ def tighten(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, i: int
     near = lo[i] if end == 0 else hi[i]
     for _ in range(CERTIFICATES):
         low[i] = high[i] = near
-        status, _, _, y, _ = solve_step(model, t, facets, low, high)
+        status, _, _, y, _ = solve_step(scaled, t, facets, low, high)
         if status != INFEASIBLE:
             return True
-        others = shortfall(model, t, facets, low, high, y) + reach(model, t, f, near, y) - CERTAIN
-        if reach(model, t, f, far, y) < others:
+        others = shortfall(scaled, t, facets, low, high, y) + reach(scaled, t, f, near, y) - CERTAIN
+        if reach(scaled, t, f, far, y) < others:
             return False  # convex in rho: no rho in between reaches it either
-        near = first_reach(model, t, f, near, far, y, others)
+        near = first_reach(scaled, t, f, near, far, y, others)
         if end == 0:
             lo[i] = near
         else:
             hi[i] = near
-    possible = balanced_rho(model, t, facets, lo, hi, i)
+    possible = balanced_rho(scaled, t, facets, lo, hi, i)
     if possible < 0 or possible == np.inf:
         return possible < 0
     for _ in range(BISECTIONS):
         low[i] = high[i] = 0.5 * (near + possible)
-        if solve_step(model, t, facets, low, high)[0] == INFEASIBLE:
+        if solve_step(scaled, t, facets, low, high)[0] == INFEASIBLE:
             near = low[i]
         else:
             possible = low[i]
@@ -226,12 +227,12 @@ def tighten(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, i: int
 
 
 @compiled
-def balanced_rho(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, i: int) -> float:
+def balanced_rho(scaled: ScaledTask, t: int, facets: IntArray, lo: Array, hi: Array, i: int) -> float:
     """The rho of finger i in the least-cost balance over the box; -1: unknown, or any rho will do; inf: none exists."""
-    status, _, _, _, x = solve_step(model, t, facets, lo, hi)
+    status, _, _, _, x = solve_step(scaled, t, facets, lo, hi)
     if status != SOLVED:
         return np.inf if status == INFEASIBLE else -1.0
-    each, k = rays_per_end(model), 0
+    each, k = rays_per_end(scaled), 0
     for j in range(i):
         k += each if lo[j] == hi[j] else 2 * each
     at_low, at_high = x[k : k + each].sum(), x[k + each : k + 2 * each].sum()
@@ -241,12 +242,12 @@ def balanced_rho(model: Model, t: int, facets: IntArray, lo: Array, hi: Array, i
 
 
 @compiled
-def first_reach(model: Model, t: int, f: int, rho: float, far: float, y: Array, wanted: float) -> float:
+def first_reach(scaled: ScaledTask, t: int, f: int, rho: float, far: float, y: Array, wanted: float) -> float:
     """Where `reach`, convex with reach(rho) < wanted <= reach(far), attains `wanted`; never beyond that point."""
     short, long = rho, far
     for _ in range(60):
         middle = 0.5 * (short + long)
-        if reach(model, t, f, middle, y) < wanted:
+        if reach(scaled, t, f, middle, y) < wanted:
             short = middle  # convex: nothing between rho and here reaches it
         else:
             long = middle

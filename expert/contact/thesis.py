@@ -63,11 +63,13 @@ def solve(
 
 def cost(x: Variables, s: ScaledTask) -> cp.Expression:
     """J = sum |lam|^2 + |p_ddot|^2 - beta (Thesis 3.1.4), in (m g)^2; p_ddot by backward differences, t >= 3."""
-    objective = s.force_cost * cp.sum_squares(cp.vec(x.lam, order="F"))
-    if len(s.centres) > 2:
+    objective = s.force_weight * cp.sum_squares(cp.vec(x.lam, order="F"))
+    if s.steps > 2:
         p_ddot = x.p[2:] - 2 * x.p[1:-1] + x.p[:-2]
-        objective += s.acceleration_cost * cp.sum_squares(cp.vec(p_ddot, order="F"))
-    return objective - s.margin_cost * cp.sum(x.beta) if s.margin_cost else objective
+        objective += s.acceleration_weight * cp.sum_squares(cp.vec(p_ddot, order="F"))
+    if not s.margin_weight:
+        return objective
+    return objective - s.margin_weight * np.hypot(1, s.true_friction) * cp.sum(x.beta)
 
 
 def blocks(x: Variables, s: ScaledTask, task: ContactTask, segments: int) -> list[Block]:
@@ -83,7 +85,9 @@ def blocks(x: Variables, s: ScaledTask, task: ContactTask, segments: int) -> lis
         non_penetration(x, s),  # 3-CT7
         torque_envelopes(x, s, segments),  # 3-CT8, 3-CT9
     ]
-    return [*program, cone_distance(x, mu, task.robustness.cone_fraction * mu)] if s.margin_cost else program
+    return (
+        [*program, cone_distance(x, mu, task.robustness.cone_fraction * mu)] if s.margin_weight else program
+    )
 
 
 def _plan(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import cvxpy as cp
 import numpy as np
 
-from expert.contact.scaled import ScaledTask
+from expert.contact.scaled import ScaledTask, belonging, end_points, finger_rays
 from expert.mip.block import Block, implies
 from expert.mip.mccormick import Cells, piecewise
 
@@ -13,7 +13,7 @@ from expert.mip.mccormick import Cells, piecewise
 @dataclass(frozen=True)
 class Variables:
     """Table 3.1.  p (t, c, d) positions; lam (t, c, d) forces; tau (t, c, 2): (p_x - q_x) lam_y and (p_y - q_y) lam_x;
-    rho (t, c, f, j) facet weights; alpha (t, c, f, k) cone weights; alpha_e (i,) environment weights;
+    rho (t, c, f, j) facet weights; alpha (t, c, f, k) cone weights; alpha_e (t, e) environment weights;
     T (t, c, f) contact assignment; R (t, c, r) regions; W (t, c, 2, k) envelopes; beta (t, c) distance to the cone's edge.
 
     T = 1 while the finger touches the facet, the step of its release included.
@@ -33,16 +33,16 @@ class Variables:
     @classmethod
     def of(cls, s: ScaledTask, fingers: int, segments: int) -> "Variables":
         """Variables with their boxes: workspace, force limit, reaction limit."""
-        (T, F, R), C = s.shape, fingers
+        T, F, R, C = s.steps, s.facets, s.regions, fingers
         low, high = (np.broadcast_to(corner, (T, C, 2)) for corner in s.workspace)
-        reaction = s.reaction_rows.T @ s.reaction_limits
+        reaction = np.einsum("teg,tg->te", belonging(s), s.limit)
         return cls(
             p=cp.Variable((T, C, 2), bounds=[low, high], name="p"),
             lam=cp.Variable((T, C, 2), name="lam"),
             tau=cp.Variable((T, C, 2), name="tau"),
             rho=cp.Variable((T, C, F, 2), bounds=[0, 1], name="rho"),
             alpha=cp.Variable((T, C, F, 2), bounds=[0, s.max_force], name="alpha"),
-            alpha_e=cp.Variable(len(reaction), bounds=[np.zeros_like(reaction), reaction], name="alpha_e"),
+            alpha_e=cp.Variable(reaction.shape, bounds=[np.zeros_like(reaction), reaction], name="alpha_e"),
             T=cp.Variable((T, C, F), boolean=True, name="T"),
             R=cp.Variable((T, C, R), boolean=True, name="R"),
             W=cp.Variable((T, C, 2, 2 * segments), boolean=True, name="W"),
@@ -57,18 +57,20 @@ class Variables:
 
 def linear_dynamics(x: Variables, s: ScaledTask) -> Block:
     """3-CT1: m q_ddot = m g + sum_c lam_c + sum_n lam^e_n."""
-    return Block.of("3-CT1", cp.sum(x.lam, axis=1) + s.reactions[:, :2] @ x.alpha_e == s.required[:, :2])
+    reactions = cp.einsum("te,ted->td", x.alpha_e, s.rays[..., :2])
+    return Block.of("3-CT1", cp.sum(x.lam, axis=1) + reactions == s.required[:, :2])
 
 
 def angular_dynamics(x: Variables, s: ScaledTask) -> Block:
     """3-CT2: I theta_ddot = sum_c tau_c + sum_n R v_n x lam^e_n."""
     torque = cp.sum(x.tau[:, :, 0] - x.tau[:, :, 1], axis=1)
-    return Block.of("3-CT2", torque + s.reactions[:, 2] @ x.alpha_e == s.required[:, 2])
+    reactions = cp.einsum("te,te->t", x.alpha_e, s.rays[..., 2])
+    return Block.of("3-CT2", torque + reactions == s.required[:, 2])
 
 
 def lever_arm(x: Variables, s: ScaledTask) -> cp.Expression:
     """p_c - q (t, c, d) where the finger touches, else 0: sum_f sum_j rho_j (v^f_j - q)."""
-    return cp.einsum("tcfj,tfjd->tcd", x.rho, s.levers)
+    return cp.einsum("tcfj,tfjd->tcd", x.rho, end_points(s))
 
 
 def contact_assignment(x: Variables, s: ScaledTask, margin: float) -> Block:
@@ -80,8 +82,8 @@ def contact_assignment(x: Variables, s: ScaledTask, margin: float) -> Block:
         "3-CT3",
         cp.sum(x.rho, axis=3) == x.T,
         x.rho >= margin * x.T[..., None],
-        implies(x.touching, x.p == s.centres[:, None] + lever_arm(x, s)),
-        x.lam == cp.einsum("tcfk,tfkd->tcd", x.alpha, s.rays),
+        implies(x.touching, x.p == s.centre[:, None] + lever_arm(x, s)),
+        x.lam == cp.einsum("tcfk,tfkd->tcd", x.alpha, finger_rays(s)),
     )
 
 
@@ -113,17 +115,17 @@ def alternated_sticking(x: Variables, s: ScaledTask, min_interval: int) -> Block
 
 def environment_cones(x: Variables, s: ScaledTask) -> Block:
     """3-CT6: lam^e_n = sum_k alpha^e_k gamma^e_nk with alpha^e >= 0, on the edge where the vertex slides."""
-    return Block.of("3-CT6", s.reaction_rows @ x.alpha_e <= s.reaction_limits)
+    return Block.of("3-CT6", cp.einsum("te,teg->tg", x.alpha_e, belonging(s)) <= s.limit)
 
 
 def non_penetration(x: Variables, s: ScaledTask) -> Block:
     """3-CT7: R_rc = 1 => A_r p_c <= b_r, one region or one facet per finger; walls bind every finger."""
-    place = cp.einsum("tcd,trhd->tcrh", x.p, s.region_A)
+    place = cp.einsum("tcd,trhd->tcrh", x.p, s.region[..., :2])
     return Block.of(
         "3-CT7",
         cp.sum(x.R, axis=2) + x.touching == 1,
-        implies(x.R, place <= s.region_b[:, None]),
-        *([cp.einsum("tcd,wd->tcw", x.p, s.wall_A) <= s.wall_b] if len(s.wall_b) else []),
+        implies(x.R, place <= s.region[:, None, ..., 2]),
+        *([cp.einsum("tcd,wd->tcw", x.p, s.walls[:, :2]) >= s.walls[:, 2]] if len(s.walls) else []),
     )
 
 
@@ -136,13 +138,13 @@ def torque_envelopes(x: Variables, s: ScaledTask, segments: int) -> Block:
 
 def torque_cells(s: ScaledTask, segments: int) -> Cells:
     """Cells over the reach of the object's vertices and of a finger's force."""
-    reach = float(np.linalg.norm(s.levers, axis=-1).max())
-    force = s.max_force * float(np.linalg.norm(s.rays, axis=-1).max())
+    reach = float(np.linalg.norm(end_points(s), axis=-1).max())
+    force = s.max_force * float(np.linalg.norm(finger_rays(s), axis=-1).max())
     return Cells.sign_split(reach, force, segments)
 
 
 def cone_distance(x: Variables, friction: float, planned: float) -> Block:
-    """beta <= (mu lam_n -+ lam_t) / sqrt(1 + mu^2), full mu, for forces planned within a cone of friction `planned`."""
+    """beta (Thesis 3.1.4): beta <= (mu lam_n -+ lam_t) / sqrt(1 + mu^2), full mu, for forces planned within a cone of friction `planned`."""
     normal, tangential = (
         cp.sum(x.alpha, axis=(2, 3)),
         planned * cp.sum(x.alpha[..., 0] - x.alpha[..., 1], axis=2),

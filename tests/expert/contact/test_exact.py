@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from expert.contact import exact, model, solve
+from expert.budget import Budget
+from expert.contact import scaled, solve
 from expert.contact.exact import warm_up
-from expert.contact.model import Model, model_of
 from expert.contact.plan_at import forces_at
+from expert.contact.scaled import ScaledTask
 from expert.contact.search import Search
 from expert.contact.sequence import sequence_of
 from expert.errors import InvalidProblem, SolverFailed
@@ -35,7 +36,7 @@ def drawn(seed: int, **options: Any) -> ContactTask:
     return floor_task(rng, **options) if seed % 2 else table_task(rng, **options)
 
 
-def least_over_grid(m: Model, fingers: int, width: int) -> float:
+def least_over_grid(m: ScaledTask, fingers: int, width: int) -> float:
     """Cheapest plan over all mode sequences without a free step in between and a grid of contact positions [(m g)^2].
 
     Such fingers are pressed on one facet all the time, or arrive, or leave: the smoothing cost of their free steps is 0.
@@ -71,7 +72,7 @@ def _free_at_rest(s: Any, z: Array) -> Array:
 def test_one_finger_optimum_equals_enumeration_over_modes_and_a_fine_grid(seed: int) -> None:
     task = drawn(seed, facets=3, steps=3, fingers=1)
     scale = task.weight**2
-    grid = least_over_grid(model_of(task), 1, 400) * scale
+    grid = least_over_grid(ScaledTask.of(task), 1, 400) * scale
     plan = solve(task)
     if plan.status == "infeasible":
         assert grid == np.inf
@@ -86,7 +87,7 @@ def test_one_finger_optimum_equals_enumeration_over_modes_and_a_fine_grid(seed: 
 def test_two_finger_optimum_is_no_worse_than_enumeration_over_modes_and_a_grid(seed: int) -> None:
     task = drawn(seed, facets=3, steps=2)
     plan = solve(task)
-    grid = least_over_grid(model_of(task), 2, 25) * task.weight**2
+    grid = least_over_grid(ScaledTask.of(task), 2, 25) * task.weight**2
     assert plan.bound <= grid * (1 + 1e-9)
     if plan.status == "infeasible":
         assert grid == np.inf
@@ -193,15 +194,11 @@ def breaks_down(*_: Any) -> Any:
     raise RuntimeError("injected")
 
 
-def with_fast_path_failing(task: ContactTask) -> Model:
-    return model_of(task, iterations=0)
-
-
 def test_without_the_fast_solver_the_fallbacks_find_the_same_optimum(monkeypatch: Any) -> None:
     task = drawn(3, facets=3, steps=3)
     reference = solve(task)
     warm_up()
-    monkeypatch.setattr(exact, "model_of", with_fast_path_failing)
+    monkeypatch.setattr(scaled, "QP_ITERATIONS", 0)
     plan = solve(task, node_limit=300)
     assert plan.found
     assert plan.objective == pytest.approx(reference.objective, rel=2e-3)
@@ -215,7 +212,7 @@ def test_failing_solvers_never_make_a_task_infeasible(seed: int, monkeypatch: An
     warm_up()
     for name in ("_daqp", "_piqp", "_clarabel"):
         monkeypatch.setattr(qp, name, breaks_down)
-    monkeypatch.setattr(exact, "model_of", with_fast_path_failing)
+    monkeypatch.setattr(scaled, "QP_ITERATIONS", 0)
     try:
         plan = solve(task, node_limit=300)
     except SolverFailed:
@@ -228,7 +225,7 @@ def test_bounds_without_any_working_solver_stay_below_the_optimum(monkeypatch: A
     best = solve(task).objective
     for name in ("_daqp", "_piqp", "_clarabel"):
         monkeypatch.setattr(qp, name, breaks_down)
-    outcome = Search(model.model_of(task, iterations=0), 2, 1e-3).run(node_limit=50, deadline=np.inf)
+    outcome = Search(ScaledTask.of(task)._replace(iterations=0), 2, 1e-3).run(Budget(np.inf), 50)
     assert outcome.bound * task.weight**2 <= best
 
 

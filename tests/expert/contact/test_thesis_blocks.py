@@ -8,7 +8,7 @@ import pytest
 
 from expert.contact import solve as solve_exactly
 from expert.contact import thesis_blocks as blocks
-from expert.contact.scaled import ScaledTask
+from expert.contact.scaled import ScaledTask, end_points
 from expert.contact.thesis import blocks as all_blocks
 from expert.contact.thesis import cost
 from expert.contact.thesis_blocks import Variables
@@ -100,7 +100,7 @@ def test_ct1_leaves_no_force_unbalanced(x: Variables, s: ScaledTask, largest: Ca
 
 def test_ct2_leaves_no_torque_unbalanced(x: Variables, s: ScaledTask, largest: Callable[..., float]) -> None:
     block = blocks.angular_dynamics(x, s)
-    torque = cp.sum(x.tau[2, :, 0] - x.tau[2, :, 1]) + s.reactions[2, 2] @ x.alpha_e
+    torque = cp.sum(x.tau[2, :, 0] - x.tau[2, :, 1]) + s.rays[2, :, 2] @ x.alpha_e[2]
     for sign in (1, -1):
         assert largest(sign * torque, block) == pytest.approx(sign * s.required[2, 2], abs=1e-9)
 
@@ -115,7 +115,7 @@ def test_ct3_puts_a_touching_finger_on_its_facet_and_its_force_in_the_cone(
 ) -> None:
     margin, t, c, f = task.fingers.facet_margin, 1, 0, 2
     block = blocks.contact_assignment(x, s, margin)
-    a, b = s.levers[t, f] + s.centres[t]
+    a, b = end_points(s)[t, f] + s.centre[t]
     edge, fixed = b - a, on_facet(x, t, c, f)
     normal = np.array([-edge[1], edge[0]]) / np.linalg.norm(edge)
     for sign in (1, -1):
@@ -124,7 +124,7 @@ def test_ct3_puts_a_touching_finger_on_its_facet_and_its_force_in_the_cone(
     assert largest(along, block, *fixed) == pytest.approx(1 - margin, abs=1e-8)
     assert largest(-along, block, *fixed) == pytest.approx(-margin, abs=1e-8)
     mu = task.fingers.friction * task.robustness.cone_fraction
-    others = [x.alpha[t, c, g] == 0 for g in range(s.shape[1]) if g != f]
+    others = [x.alpha[t, c, g] == 0 for g in range(s.facets) if g != f]
     for sign in (1, -1):
         outside = sign * (edge / np.linalg.norm(edge)) @ x.lam[t, c] - mu * normal @ x.lam[t, c]
         assert largest(outside, block, *fixed, *others) == pytest.approx(0, abs=1e-8)
@@ -143,7 +143,7 @@ def test_ct3_lets_a_free_finger_roam_the_workspace(
 def test_ct4_gives_force_to_contacts_alone_and_within_limits(
     x: Variables, s: ScaledTask, largest: Callable[..., float]
 ) -> None:
-    block, last, f = blocks.complementarity(x, s), s.shape[0] - 1, 1
+    block, last, f = blocks.complementarity(x, s), s.steps - 1, 1
     normal = cp.sum(x.alpha[last, 0, f])
     assert largest(normal, block, x.T[last, 0, f] == 0) == pytest.approx(0, abs=1e-9)
     assert largest(normal, block, x.T[last, 0, f] == 1) == pytest.approx(s.max_force)
@@ -174,7 +174,7 @@ def test_ct5_wants_a_free_step_between_two_facets(x: Variables, s: ScaledTask) -
 
 @pytest.mark.parametrize("step", [0, 1, -1])
 def test_ct5_can_ask_for_contacts_that_last(x: Variables, s: ScaledTask, step: int) -> None:
-    T = s.shape[0]
+    T = s.steps
     alone = np.zeros(T)
     alone[step] = 1
     assert feasible(blocks.alternated_sticking(x, s, 1), x.T[:, 0, 0] == alone)
@@ -188,28 +188,29 @@ def test_ct6_keeps_reactions_in_their_cones_and_limits(
     x: Variables, s: ScaledTask, largest: Callable[..., float]
 ) -> None:
     block = blocks.environment_cones(x, s)
-    assert len(s.contacts) > 0
-    for e, contact in enumerate(s.contacts):
-        rays = np.flatnonzero(s.reaction_rows[e])
-        assert largest(cp.sum(x.alpha_e[rays]), block) == pytest.approx(s.reaction_limits[e])
-        normal = contact.rays[:, 1]
+    pairs = np.argwhere((s.group[..., None] == np.arange(s.limit.shape[1])).any(axis=1))
+    assert len(pairs) > 0
+    for t, g in pairs:
+        weights = x.alpha_e[t, np.flatnonzero(s.group[t] == g)]
+        assert largest(cp.sum(weights), block) == pytest.approx(s.limit[t, g])
+        normal = s.rays[t, s.group[t] == g, 1]
         np.testing.assert_allclose(normal, 1)  # floor: rays of unit normal component
-        weights = x.alpha_e[rays]
         assert largest(-normal @ weights, block) == pytest.approx(0, abs=1e-9)
+    assert largest(cp.sum(x.alpha_e), block) == pytest.approx(s.limit.sum())  # there are no other rays
 
 
 def test_ct7_keeps_a_finger_in_its_region_and_off_the_walls(
     x: Variables, s: ScaledTask, task: ContactTask, largest: Callable[..., float]
 ) -> None:
     block, t, c = blocks.non_penetration(x, s), 1, 0
-    for r in range(s.shape[2]):
+    for r in range(s.regions):
         inside = [x.R[t, c, r] == 1]
-        for normal, b in zip(s.region_A[t, r], s.region_b[t, r], strict=True):
+        for normal, b in zip(s.region[t, r, :, :2], s.region[t, r, :, 2], strict=True):
             if normal.any() and feasible(block, *inside):
                 assert largest(normal @ x.p[t, c], block, *inside) <= b + 1e-8
     touching = [x.T[t, c, 0] == 1]
     assert largest(x.p[t, c, 1], block, *touching) == pytest.approx(s.workspace[1, 1])
-    floor = -task.fingers.clearance / s.length
+    floor = (s.origin[1] - task.fingers.clearance) / s.size
     assert largest(-x.p[t, c, 1], block, *touching) == pytest.approx(floor)
     assert not feasible(block, *touching, x.R[t, c, 0] == 1)
 

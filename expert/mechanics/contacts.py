@@ -1,10 +1,11 @@
-"""Planar mechanics that solvers and checkers share: wrenches, friction cones, contacts with walls and support."""
+"""Contacts of the object with walls and support, read from its motion, and what they leave for fingers to do (3-CT6)."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from expert.geometry.pose import Array, cross, perpendicular, to_world
+from expert.geometry.pose import Array, perpendicular, to_world
+from expert.mechanics.wrenches import friction_rays, inertial_wrench, wrench_about
 from expert.problems.contact import SUPPORT, ContactTask
 from expert.world.values import IntArray
 
@@ -29,22 +30,6 @@ class ExternalContact:
     fixed: bool = False
 
 
-def friction_rays(normal: Array, friction: float | Array) -> Array:
-    """Edges n + mu tau, n - mu tau of the cones about unit normals (..., 2): shape (..., 2 rays, 2); tau = n turned by -90 deg."""
-    tangent = -perpendicular(normal)
-    mu = np.asarray(friction, dtype=float)[..., None]
-    return np.stack([normal + mu * tangent, normal - mu * tangent], axis=-2)
-
-
-def inertial_wrench(task: ContactTask) -> Array:
-    """What all contacts together must exert, (T, 3) [N, N, N m]: m (q_ddot - g), I theta_ddot (Thesis 3-CT1, 3-CT2)."""
-    a = task.trajectory.accelerations
-    wrench = np.column_stack([task.body.mass * a[:, :2], task.body.inertia * a[:, 2]])
-    if task.environment.plane == "sagittal":
-        wrench[:, 1] += task.weight
-    return wrench
-
-
 def required_wrench(task: ContactTask, contacts: tuple[ExternalContact, ...]) -> Array:
     """What fingers and undetermined environment forces must exert about the centre of mass, (T, 3) [N, N, N m]."""
     wrench = inertial_wrench(task)
@@ -52,12 +37,6 @@ def required_wrench(task: ContactTask, contacts: tuple[ExternalContact, ...]) ->
         if c.fixed:
             wrench[c.step] -= wrench_about(c.rays[0], c.point, task.trajectory.poses[c.step, :2])
     return wrench
-
-
-def wrench_about(force: Array, point: Array, centre: Array) -> Array:
-    """Force (..., 2) [N] at point (..., 2) [m] as a wrench (..., 3) about `centre`."""
-    arm = np.asarray(point) - centre
-    return np.concatenate([np.asarray(force, dtype=float), cross(arm, force)[..., None]], axis=-1)
 
 
 def reaction_limit(task: ContactTask) -> float:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from expert.contact.model import Model
+from expert.contact.scaled import ScaledTask
 from expert.contact.sequence import (
     FLAT,
     Sequence,
@@ -79,7 +79,7 @@ def pushes(sequence: Sequence, t: int) -> IntArray:
 
 
 @compiled
-def narrow(model: Model, sequence: Sequence, lo: Array, hi: Array) -> bool:
+def narrow(scaled: ScaledTask, sequence: Sequence, lo: Array, hi: Array) -> bool:
     """Tighten the box to contact positions from which every step can be balanced.  False: proved empty."""
     for _ in range(2):
         before = (hi - lo).sum()
@@ -88,7 +88,7 @@ def narrow(model: Model, sequence: Sequence, lo: Array, hi: Array) -> bool:
             low, high = lo[on], hi[on]
             for i in range(on.size):
                 for end in range(2):
-                    if low[i] < high[i] and not tighten(model, t, sequence.facet[on], low, high, i, end):
+                    if low[i] < high[i] and not tighten(scaled, t, sequence.facet[on], low, high, i, end):
                         return False
                 lo[on[i]], hi[on[i]] = low[i], high[i]
                 if low[i] > high[i]:
@@ -99,23 +99,23 @@ def narrow(model: Model, sequence: Sequence, lo: Array, hi: Array) -> bool:
 
 
 @compiled
-def support(model: Model, t: int, f: int, rho: float, y: Array, proof: bool) -> float:
+def support(scaled: ScaledTask, t: int, f: int, rho: float, y: Array, proof: bool) -> float:
     """h(rho) for a bound on the cost, or `reach` for a proof that there is no balance; both convex in rho."""
-    return reach(model, t, f, rho, y) if proof else gain(model, t, f, rho, y)
+    return reach(scaled, t, f, rho, y) if proof else gain(scaled, t, f, rho, y)
 
 
 @compiled
 def open_master(
-    model: Model, sequence: Sequence, lo: Array, hi: Array, assigned: IntArray, rounds: int
+    scaled: ScaledTask, sequence: Sequence, lo: Array, hi: Array, assigned: IntArray, rounds: int
 ) -> Master:
     """The program without cuts."""
     T, n = len(sequence.modes), sequence.size
-    rows, side = standing_rows(model, sequence, lo, hi, assigned, n + T)
+    rows, side = standing_rows(scaled, sequence, lo, hi, assigned, n + T)
     most = side.size + T * (2 * rounds + 1)
     A, b, step = np.zeros((most, n + T)), np.zeros(most), np.full(most, -1)
     A[: side.size], b[: side.size] = rows, side
     H, g = np.zeros((n + T, n + T)), np.ones(n + T)
-    ridge = FLAT * (1 + model.acceleration_weight)
+    ridge = FLAT * (1 + scaled.acceleration_weight)
     H[:n, :n] = sequence.Q
     g[:n] = sequence.q - ridge * sequence.reference
     for i in range(n + T):
@@ -125,7 +125,7 @@ def open_master(
 
 @compiled
 def add_cut(
-    model: Model,
+    scaled: ScaledTask,
     sequence: Sequence,
     master: Master,
     t: int,
@@ -141,15 +141,15 @@ def add_cut(
     Adds to `error`, by interval, how far the chords miss at `at`.
     """
     row = master.A[master.filled[0]]
-    side = model.required[t] @ y - environment_reach(model, t, y)
+    side = scaled.required[t] @ y - environment_reach(scaled, t, y)
     for k in pushes(sequence, t):
         f, width = sequence.facet[k], hi[k] - lo[k]
-        low, high = support(model, t, f, lo[k], y, proof), support(model, t, f, hi[k], y, proof)
+        low, high = support(scaled, t, f, lo[k], y, proof), support(scaled, t, f, hi[k], y, proof)
         if width > 0:
             slope = (high - low) / width
             row[k] += slope
             side -= low - slope * lo[k]
-            error[k] += low + slope * (at[k] - lo[k]) - support(model, t, f, at[k], y, proof)
+            error[k] += low + slope * (at[k] - lo[k]) - support(scaled, t, f, at[k], y, proof)
         else:
             side -= max(low, high)
     master.b[master.filled[0]] = side - CERTAIN if proof else side
@@ -161,7 +161,7 @@ def add_cut(
 
 @compiled
 def relax(
-    model: Model,
+    scaled: ScaledTask,
     sequence: Sequence,
     lo: Array,
     hi: Array,
@@ -172,33 +172,33 @@ def relax(
 ) -> Relaxed:
     """Alternate master program and exact evaluation until the gap closes, the bound exceeds `target` or chords dominate."""
     T, n = len(sequence.modes), sequence.size
-    master = open_master(model, sequence, lo, hi, assigned, rounds)
+    master = open_master(scaled, sequence, lo, hi, assigned, rounds)
     z, last = sequence.reference, sequence.reference
     best, bound, forces = np.inf, -np.inf, 0.0
     intrusion, error = (-1, -1, 0.0), np.zeros(lo.size)
     for t in range(T):
         on = pushes(sequence, t)
-        status, _, value, y, _ = solve_step(model, t, sequence.facet[on], lo[on], hi[on])
+        status, _, value, y, _ = solve_step(scaled, t, sequence.facet[on], lo[on], hi[on])
         if status == INFEASIBLE:
             return Relaxed(np.inf, np.inf, np.inf, z, z, intrusion, error)
         forces += value
-        add_cut(model, sequence, master, t, lo, hi, y, False, lo, error)
+        add_cut(scaled, sequence, master, t, lo, hi, y, False, lo, error)
     for _ in range(rounds):
         m = master.filled[0]
         A, b = master.A[:m], master.b[:m]
-        status, x, u = solve_qp(master.H, master.g, A, b, np.int64(0), model.iterations)
-        if status == INFEASIBLE and empty(model, master, u, lo, hi, n):
+        status, x, u = solve_qp(master.H, master.g, A, b, np.int64(0), scaled.iterations)
+        if status == INFEASIBLE and empty(scaled, master, u, lo, hi, n):
             return Relaxed(np.inf, forces, best, z, last, intrusion, error)
         if status != SOLVED:
             break
         last = x[:n].copy()
         last[: lo.size] = np.minimum(np.maximum(last[: lo.size], lo), hi)
-        bound = max(bound, safe_bound(model, sequence, master, last, u, lo, hi))
-        intrusion = worst_intrusion(model, sequence, last, assigned)
+        bound = max(bound, safe_bound(scaled, sequence, master, last, u, lo, hi))
+        intrusion = worst_intrusion(scaled, sequence, last, assigned)
         if bound >= target:
             break
         error[:] = 0.0
-        cost, missing = evaluate(model, sequence, master, last, lo, hi, error)
+        cost, missing = evaluate(scaled, sequence, master, last, lo, hi, error)
         if cost < best and intrusion[2] == 0.0:
             best, z = cost, last
         if missing == 0.0 and cost - bound <= gap * abs(cost):
@@ -211,7 +211,7 @@ def relax(
 
 @compiled
 def evaluate(
-    model: Model, sequence: Sequence, master: Master, z: Array, lo: Array, hi: Array, error: Array
+    scaled: ScaledTask, sequence: Sequence, master: Master, z: Array, lo: Array, hi: Array, error: Array
 ) -> tuple[float, float]:
     """Exact cost at z (inf: some step has no balance, which misses by the second value), adding each step's cut.
 
@@ -221,26 +221,26 @@ def evaluate(
     for t in range(len(sequence.modes)):
         on = pushes(sequence, t)
         rho = z[on]
-        status, value, _, y, _ = solve_step(model, t, sequence.facet[on], rho, rho)
+        status, value, _, y, _ = solve_step(scaled, t, sequence.facet[on], rho, rho)
         cost += value
         proof = status == INFEASIBLE
         if proof:
             if missing == 0.0:
                 error[:] = 0.0
-            missing += shortfall(model, t, sequence.facet[on], rho, rho, y)
+            missing += shortfall(scaled, t, sequence.facet[on], rho, rho, y)
             low, high = np.maximum(rho - NEARBY, lo[on]), np.minimum(rho + NEARBY, hi[on])
-            near, _, _, around, _ = solve_step(model, t, sequence.facet[on], low, high)
+            near, _, _, around, _ = solve_step(scaled, t, sequence.facet[on], low, high)
             if near == SOLVED:
-                add_cut(model, sequence, master, t, lo, hi, around, False, z, scratch)
+                add_cut(scaled, sequence, master, t, lo, hi, around, False, z, scratch)
         add_cut(
-            model, sequence, master, t, lo, hi, y, proof, z, error if proof or missing == 0.0 else scratch
+            scaled, sequence, master, t, lo, hi, y, proof, z, error if proof or missing == 0.0 else scratch
         )
     return cost, missing
 
 
 @compiled
 def safe_bound(
-    model: Model, sequence: Sequence, master: Master, z: Array, u: Array, lo: Array, hi: Array
+    scaled: ScaledTask, sequence: Sequence, master: Master, z: Array, u: Array, lo: Array, hi: Array
 ) -> float:
     """Weak duality at any multipliers: no plan in the box costs less, whatever the solver's tolerance."""
     n, total = z.size, np.zeros(len(sequence.modes))
@@ -260,11 +260,11 @@ def safe_bound(
                 side -= master.A[i, j] * z[j]
                 slope[j] -= weight * master.A[i, j]
             bound += weight * side
-    return bound + least_over_box(model, z, slope, lo, hi)
+    return bound + least_over_box(scaled, z, slope, lo, hi)
 
 
 @compiled
-def empty(model: Model, master: Master, u: Array, lo: Array, hi: Array, n: int) -> bool:
+def empty(scaled: ScaledTask, master: Master, u: Array, lo: Array, hi: Array, n: int) -> bool:
     """Whether multipliers prove, rounding aside, that no z in the box satisfies the rows that bound no theta."""
     row, side, size = np.zeros(n), 0.0, 0.0
     for i in range(u.size):
@@ -272,4 +272,4 @@ def empty(model: Model, master: Master, u: Array, lo: Array, hi: Array, n: int) 
             row -= u[i] * master.A[i, :n]
             side += u[i] * master.b[i]
             size += u[i] * (abs(master.b[i]) + np.abs(master.A[i, :n]).sum())
-    return side + least_over_box(model, np.zeros(n), row, lo, hi) > ROUNDING * size
+    return side + least_over_box(scaled, np.zeros(n), row, lo, hi) > ROUNDING * size
