@@ -21,7 +21,7 @@ def clip(polygon: Array, normals: Array, offsets: Array, tolerance: float = 0.0)
     for k in range(len(offsets)):
         gap = kept[:, 0] * normals[k, 0] + kept[:, 1] * normals[k, 1] - offsets[k]
         count, n = 0, len(kept)
-        cut = np.empty((n + 2, 2))
+        cut = np.empty((2 * n, 2))  # each edge adds at most its first corner and a crossing
         for i in range(n):
             j = i + 1 if i + 1 < n else 0
             if gap[i] <= tolerance:

@@ -9,19 +9,43 @@ one           n, -n;  three that span positively                |P| = E, t = arg
 two           n, n, -n;  four                                   Re(exp(-i t) P_k) = E_k for k = a, b     degree 4
 """
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 
 from expert.geometry.pose import Array
 from expert.verify.grasp.finger_path import Facets
 from expert.verify.grasp.unit_roots import one_sign, roots_in_unit
+from expert.world.values import IntArray
 
 PARALLEL = 1e-9
 """Normals whose cross product is below this are parallel."""
 ROUND = 1e-9
 """Relative lengths and rates below this count as zero: contacts that neither close nor open along a segment make no event."""
-Reduced = tuple[float, float, float, float, float]
-"""P at the segment's start (re, im), its change over the segment (re, im), and E."""
+
+
+class ContactSet(NamedTuple):
+    """Finger and facet of each contact, (m,), and a basis (b, m) of {lambda: sum lambda n = 0}."""
+
+    fingers: IntArray
+    facets: IntArray
+    balances: Array
+
+
+class Segment(NamedTuple):
+    """Fingers (N, 2) at its start, and their way to its end."""
+
+    start: Array
+    step: Array
+
+
+class Reduced(NamedTuple):
+    """f of one null vector: P at the segment's start, its change over the segment, and E."""
+
+    P: complex
+    change: complex
+    E: float
 
 
 @numba.njit(cache=True)
@@ -47,124 +71,117 @@ def spans(normals: Array) -> bool:
 
 
 @numba.njit(cache=True)
-def null_vectors(normals: Array, out: Array) -> int:
-    """Write a basis of {lambda: sum lambda n = 0} for normals (m, 2) to rows of `out` (., 4); returns its size, m - rank."""
-    out[:] = 0.0
+def balances(normals: Array) -> Array:
+    """Basis (m - rank, m) of {lambda: sum lambda n = 0} for normals (m, 2), entries up to 1."""
     m = len(normals)
     bi, bj, best = least_parallel(normals)
-    count = 0
     if abs(best) <= PARALLEL:
+        basis = np.zeros((m - 1, m))
         for k in range(1, m):
-            out[count, k] = 1.0
-            out[count, 0] = -(normals[0, 0] * normals[k, 0] + normals[0, 1] * normals[k, 1])
-            count += 1
-        return count
+            basis[k - 1, k] = 1.0
+            basis[k - 1, 0] = -(normals[0, 0] * normals[k, 0] + normals[0, 1] * normals[k, 1])
+        return basis
+    basis, count = np.zeros((m - 2, m)), 0
     for k in range(m):
         if k != bi and k != bj:
-            out[count, k] = 1.0
-            out[count, bi] = -(normals[k, 0] * normals[bj, 1] - normals[k, 1] * normals[bj, 0]) / best
-            out[count, bj] = -(normals[bi, 0] * normals[k, 1] - normals[bi, 1] * normals[k, 0]) / best
-            largest = max(1.0, abs(out[count, bi]), abs(out[count, bj]))
-            out[count] /= largest
+            row = basis[count]
+            row[k] = 1.0
+            row[bi] = -(normals[k, 0] * normals[bj, 1] - normals[k, 1] * normals[bj, 0]) / best
+            row[bj] = -(normals[bi, 0] * normals[k, 1] - normals[bi, 1] * normals[k, 0]) / best
+            row /= max(1.0, abs(row[bi]), abs(row[bj]))
             count += 1
-    return count
+    return basis
 
 
 @numba.njit(cache=True)
-def closing_poses(
-    null: Array, size: int, chosen: np.ndarray, facets: Facets, knots: Array, poses: Array
-) -> int:
-    """Write to `poses` (., 2) the fractions of a segment, knots (2, N, 2), and angles at which contacts may close.
-
-    null (., 4): so many null vectors, one or two, of the contacts chosen (m, 2): finger, facet.  Returns how many.
-    """
-    first = _reduced(null[0], chosen, facets, knots)
-    if size == 2:
-        return _double(first, _reduced(null[1], chosen, facets, knots), poses)
-    return _single(null[0, : len(chosen)], first, poses)
+def closing_poses(contacts: ContactSet, facets: Facets, segment: Segment) -> Array:
+    """Fractions of a segment and angles (r, 2) at which contacts with one or two null vectors may close."""
+    first = _reduced(contacts.balances[0], contacts, facets, segment)
+    if len(contacts.balances) == 2:
+        return _double(first, _reduced(contacts.balances[1], contacts, facets, segment))
+    return _single(contacts.balances[0], first)
 
 
 @numba.njit(cache=True)
-def _reduced(null: Array, chosen: np.ndarray, facets: Facets, knots: Array) -> Reduced:
-    """Coefficients of f for one null vector."""
-    px, py, dx, dy, e = 0.0, 0.0, 0.0, 0.0, 0.0
-    for a in range(len(chosen)):
-        n, j, w = chosen[a, 0], chosen[a, 1], null[a]
-        nx, ny = facets.normals[j, 0], facets.normals[j, 1]
-        x, y = knots[0, n, 0], knots[0, n, 1]
-        sx, sy = knots[1, n, 0] - x, knots[1, n, 1] - y
-        px += w * (nx * x + ny * y)
-        py += w * (nx * y - ny * x)
-        dx += w * (nx * sx + ny * sy)
-        dy += w * (nx * sy - ny * sx)
-        e += w * facets.offsets[j]
-    return px, py, dx, dy, e
+def _reduced(balance: Array, contacts: ContactSet, facets: Facets, segment: Segment) -> Reduced:
+    """f for one null vector (m,)."""
+    P, change, E = 0j, 0j, 0.0
+    for a in range(len(balance)):
+        n, j, weight = contacts.fingers[a], contacts.facets[a], balance[a]
+        conjugate = complex(facets.normals[j, 0], -facets.normals[j, 1])
+        P += weight * conjugate * complex(segment.start[n, 0], segment.start[n, 1])
+        change += weight * conjugate * complex(segment.step[n, 0], segment.step[n, 1])
+        E += weight * facets.offsets[j]
+    return Reduced(P, change, E)
 
 
 @numba.njit(cache=True)
-def _single(weights: Array, reduced: Reduced, poses: Array) -> int:
+def _single(weights: Array, f: Reduced) -> Array:
     """(fraction, angle) rows where |P| falls to E > 0; none if the weights lambda (m,) are not positive."""
-    if weights.min() <= PARALLEL:
-        return 0
+    if weights.min() <= PARALLEL or f.E <= 0:
+        return np.empty((0, 2))
     total = weights.sum()
-    px, py, dx, dy, e = reduced
-    px, py, dx, dy, e = px / total, py / total, dx / total, dy / total, e / total
-    if e <= 0:
-        return 0
-    found = np.empty(8)
-    c = np.array([px * px + py * py - e * e, 2 * (px * dx + py * dy), dx * dx + dy * dy])
-    count = 0
-    for r in range(roots_in_unit(c, found)):
-        t = found[r]
-        x, y = px + t * dx, py + t * dy
-        if x * dx + y * dy <= ROUND:
-            poses[count, 0], poses[count, 1] = t, np.arctan2(y, x)
+    P, change, E = f.P / total, f.change / total, f.E / total
+    distance = np.array([_dot(P, P) - E * E, 2 * _dot(P, change), _dot(change, change)])
+    roots = roots_in_unit(distance)
+    poses, count = np.empty((len(roots), 2)), 0
+    for fraction in roots:
+        there = P + fraction * change
+        if _dot(there, change) <= ROUND:
+            poses[count] = fraction, np.arctan2(there.imag, there.real)
             count += 1
-    return count
+    return poses[:count]
 
 
 @numba.njit(cache=True)
-def _double(a: Reduced, b: Reduced, poses: Array) -> int:
-    """(fraction, angle) rows with Re(exp(-i t) P_a) = E_a and Re(exp(-i t) P_b) = E_b."""
-    ax, ay, adx, ady, ea = a
-    bx, by, bdx, bdy, eb = b
-    ux0, ux1 = ea * bx - eb * ax, ea * bdx - eb * adx  # E_a P_b - E_b P_a = (u, v), linear in the fraction
-    uy0, uy1 = ea * by - eb * ay, ea * bdy - eb * ady
-    d0, d2 = ax * by - ay * bx, adx * bdy - ady * bdx  # the determinant of (P_a, P_b), quadratic
-    d1 = ax * bdy + adx * by - ay * bdx - ady * bx
-    c = np.array([
-        ux0 * ux0 + uy0 * uy0 - d0 * d0,
-        2 * (ux0 * ux1 + uy0 * uy1) - 2 * d0 * d1,
-        ux1 * ux1 + uy1 * uy1 - d1 * d1 - 2 * d0 * d2,
+def _double(a: Reduced, b: Reduced) -> Array:
+    """(fraction, angle) rows with Re(exp(-i t) P_a) = E_a and Re(exp(-i t) P_b) = E_b.
+
+    Where P_a and P_b span the plane, exp(i t) = -i (E_a P_b - E_b P_a) / det(P_a, P_b) must be of length 1.
+    """
+    u0, u1 = a.E * b.P - b.E * a.P, a.E * b.change - b.E * a.change
+    d0, d2 = _det(a.P, b.P), _det(a.change, b.change)
+    d1 = _det(a.P, b.change) + _det(a.change, b.P)
+    misfit = np.array([
+        _dot(u0, u0) - d0 * d0,
+        2 * _dot(u0, u1) - 2 * d0 * d1,
+        _dot(u1, u1) - d1 * d1 - 2 * d0 * d2,
         -2 * d1 * d2,
         -d2 * d2,
     ])  # fmt: skip
-    if one_sign(c):
-        return 0
-    found = np.empty(8)
-    count = 0
-    for r in range(roots_in_unit(c, found)):
-        t = found[r]
-        count = _angles(t, ax + t * adx, ay + t * ady, ea, bx + t * bdx, by + t * bdy, eb, poses, count)
-    return count
+    if one_sign(misfit):
+        return np.empty((0, 2))
+    roots = roots_in_unit(misfit)
+    poses, count = np.empty((2 * len(roots), 2)), 0
+    for fraction in roots:
+        for angle in _angles(a.P + fraction * a.change, a.E, b.P + fraction * b.change, b.E):
+            poses[count] = fraction, angle
+            count += 1
+    return poses[:count]
 
 
 @numba.njit(cache=True)
-def _angles(
-    t: float, px: float, py: float, ea: float, qx: float, qy: float, eb: float, poses: Array, count: int
-) -> int:
-    """Append (t, angle) for the angles at which both equations hold with P_a = (px, py), P_b = (qx, qy)."""
-    det = px * qy - py * qx
+def _angles(Pa: complex, Ea: float, Pb: complex, Eb: float) -> Array:
+    """Angles (0, 1 or 2) at which both equations hold."""
+    det = _det(Pa, Pb)
     if abs(det) > 1e-6:
-        cosine, sine = (ea * qy - eb * py) / det, (px * eb - qx * ea) / det
-        poses[count, 0], poses[count, 1] = t, np.arctan2(sine, cosine)
-        return count + 1
-    if np.hypot(qx, qy) > np.hypot(px, py):  # parallel: the longer one decides, with both its angles
-        px, py, ea = qx, qy, eb
-    long = np.hypot(px, py)
-    if long > ROUND and abs(ea) <= long * (1 + 1e-6):
-        turn = np.arccos(min(max(ea / long, -1.0), 1.0))
-        for sign in (-1.0, 1.0):
-            poses[count, 0], poses[count, 1] = t, np.arctan2(py, px) + sign * turn
-            count += 1
-    return count
+        direction = -1j * (Ea * Pb - Eb * Pa) / det
+        return np.array([np.arctan2(direction.imag, direction.real)])
+    P, E = (
+        (Pb, Eb) if abs(Pb) > abs(Pa) else (Pa, Ea)
+    )  # parallel: the longer one decides, with both its angles
+    if abs(P) <= ROUND or abs(E) > abs(P) * (1 + 1e-6):
+        return np.empty(0)
+    turn = np.arccos(min(max(E / abs(P), -1.0), 1.0))
+    middle = np.arctan2(P.imag, P.real)
+    return np.array([middle - turn, middle + turn])
+
+
+@numba.njit(cache=True)
+def _dot(a: complex, b: complex) -> float:
+    return a.real * b.real + a.imag * b.imag
+
+
+@numba.njit(cache=True)
+def _det(a: complex, b: complex) -> float:
+    return a.real * b.imag - a.imag * b.real

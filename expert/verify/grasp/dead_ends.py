@@ -8,7 +8,7 @@ import numpy as np
 from expert.errors import SolverFailed
 from expert.geometry.polygon import signed_distance
 from expert.geometry.pose import Array, rotation
-from expert.verify.grasp.event_kernel import COLUMNS, TOUCH, closing_contacts
+from expert.verify.grasp.event_kernel import EVENT, TOUCH, Candidates, closing_contacts
 from expert.verify.grasp.finger_path import FingerPath
 
 AT_GOAL = 1e-6
@@ -49,36 +49,38 @@ def dead_end_events(path: FingerPath) -> list[DeadEndEvent]:
 
     Raises SolverFailed where there are more than can be listed.
     """
-    contacts, rows = _closing(path)
-    free = [(row, interval) for row in rows for interval in _free_intervals(path, row)]
-    ends = [_dead_end(path, contacts, row, interval) for row, interval in free]
+    contacts, events = _closing(path)
+    free = [(event, interval) for event in events for interval in _free_intervals(path, event)]
+    ends = [_dead_end(path, contacts, event, interval) for event, interval in free]
     return _distinct([end for end in ends if not _is_passed(path, end)])
 
 
-def _closing(path: FingerPath) -> tuple[np.ndarray, Array]:
-    """Contacts (C, 2) and the kernel's rows (E, COLUMNS)."""
+def _closing(path: FingerPath) -> tuple[np.ndarray, np.ndarray]:
+    """Contacts (C, 2) and the kernel's events (EVENT)."""
     facets, fingers = path.facets, path.knots.shape[1]
     count = len(facets.offsets)
     contacts = np.array([(i, j) for i in range(fingers) for j in range(count)])
     finger, facet = contacts.T
     after = (facet[None] == (facet[:, None] + 1) % count) & facets.reflex[facet][None]
     compatible = (finger[:, None] != finger[None]) | after | after.T
-    events = np.empty((MOST, COLUMNS))
-    found = closing_contacts(contacts, compatible, facets, np.ascontiguousarray(path.knots), events)
+    events = np.empty(MOST, EVENT)
+    candidates = Candidates(contacts, compatible, facets, np.ascontiguousarray(path.knots))
+    found = closing_contacts(candidates, events)
     if found == MOST:
         raise SolverFailed(f"more than {MOST} dead ends: the finger path is degenerate")
     return contacts, events[:found]
 
 
-def _free_intervals(path: FingerPath, row: Array) -> list[tuple[float, float]]:
+def _free_intervals(path: FingerPath, event: np.void) -> list[tuple[float, float]]:
     """Parts of the slide (or (0, 0) where there is none) on which no finger is inside the object."""
-    fingers = path.fingers(row[0] + row[1])
-    if np.isnan(row[5]):
-        seen = (fingers - row[2:4]) @ rotation(row[4])
+    turn = rotation(event["angle"])
+    seen = (path.fingers(event["segment"] + event["fraction"]) - [event["x"], event["y"]]) @ turn
+    if not event["slides"]:
         return [(0.0, 0.0)] if signed_distance(path.vertices, seen).min() >= -TOUCH else []
-    low, high = row[5], row[6]
-    seen = (fingers - row[2:4]) @ rotation(row[4])
-    step = -row[12:14] @ rotation(row[4])  # of the fingers, seen from the object that slides on
+    low, high = event["slide_from"], event["slide_to"]
+    step = (
+        -np.array([event["slide_x"], event["slide_y"]]) @ turn
+    )  # of the fingers, seen from the object that slides on
     cuts = np.unique(np.clip([low, high, *_crossings(path.vertices, seen, step)], low, high))
     middles = 0.5 * (cuts[1:] + cuts[:-1])
     places = seen[None] + middles[:, None, None] * step
@@ -104,17 +106,18 @@ def _crossings(vertices: Array, points: Array, step: Array) -> list[float]:
 
 
 def _dead_end(
-    path: FingerPath, contacts: np.ndarray, row: Array, interval: tuple[float, float]
+    path: FingerPath, contacts: np.ndarray, event: np.void, interval: tuple[float, float]
 ) -> DeadEndEvent:
-    ends = [np.array([*(row[2:4] + t * row[12:14]), row[4]]) for t in interval]
-    touched = tuple((int(i), int(j)) for i, j in contacts[row[7:11][row[7:11] >= 0].astype(int)])
-    long = np.isnan(row[5]) or interval[1] - interval[0] > 10 * STRICT  # or only ends of facets touch
+    x, y, angle = event["x"], event["y"], event["angle"]
+    ends = [np.array([x + t * event["slide_x"], y + t * event["slide_y"], angle]) for t in interval]
+    touched = contacts[event["contacts"][: event["count"]]]
+    long = not event["slides"] or interval[1] - interval[0] > 10 * STRICT  # or only ends of facets touch
     return DeadEndEvent(
-        s=float(row[0] + row[1]),
+        s=float(event["segment"] + event["fraction"]),
         first=ends[0],
         last=ends[1],
-        contacts=touched,
-        strict=bool(long and row[14] > STRICT),
+        contacts=tuple((int(i), int(j)) for i, j in touched),
+        strict=bool(long and event["clear"] > STRICT),
     )
 
 

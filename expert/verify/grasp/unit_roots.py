@@ -14,55 +14,53 @@ TOUCHING = 1e-11
 
 
 @numba.njit(cache=True)
-def roots_in_unit(coefficients: Array, found: Array) -> int:
-    """Write the real roots of a polynomial (ascending, degree <= 4) in [0, 1] to `found`; touching ones count.
-
-    Returns the number of roots.
-    """
+def roots_in_unit(coefficients: Array) -> Array:
+    """Real roots in [0, 1] of a polynomial (ascending coefficients); touching ones count."""
     n = len(coefficients)
     scale = np.abs(coefficients).max()
     if scale < ZERO:
-        return 0
-    chain = np.zeros((n, n))
-    chain[0] = coefficients / scale
+        return np.empty(0)
+    derivatives = np.zeros((n, n))
+    derivatives[0] = coefficients / scale
     for d in range(1, n):
         for k in range(n - d):
-            chain[d, k] = chain[d - 1, k + 1] * (k + 1)
-    breaks, fresh, count = np.empty(n + 2), np.empty(n + 2), 2
-    breaks[0], breaks[1] = -BEYOND, 1 + BEYOND
+            derivatives[d, k] = derivatives[d - 1, k + 1] * (k + 1)
+    breaks = np.array([-BEYOND, 1 + BEYOND])
     for d in range(n - 2, 0, -1):
-        m = _sign_changes(chain[d, : n - d], breaks, count, fresh)
-        breaks[m + 1] = breaks[count - 1]
-        breaks[1 : m + 1] = fresh[:m]
-        count = m + 2
-    total = _sign_changes(chain[0], breaks, count, found)
-    return _touching(chain[0], breaks, count, found, total)
+        roots = _sign_changes(derivatives[d, : n - d], breaks)
+        inner = np.empty(len(roots) + 2)
+        inner[0], inner[1:-1], inner[-1] = -BEYOND, roots, 1 + BEYOND
+        breaks = inner
+    crossed = _sign_changes(derivatives[0], breaks)
+    return _with_touching(derivatives[0], breaks, crossed)
 
 
 @numba.njit(cache=True)
-def _sign_changes(c: Array, breaks: Array, count: int, found: Array) -> int:
-    """Write the roots of a polynomial that is monotone between neighbouring breaks, where its sign changes."""
-    m = 0
-    for k in range(count - 1):
+def _sign_changes(c: Array, breaks: Array) -> Array:
+    """Roots of a polynomial that is monotone between neighbouring breaks, where its sign changes."""
+    found, count = np.empty(len(breaks) - 1), 0
+    for k in range(len(breaks) - 1):
         if (_value(c, breaks[k]) < 0) != (_value(c, breaks[k + 1]) < 0):
-            found[m] = _bisect(c, breaks[k], breaks[k + 1])
-            m += 1
-    return m
+            found[count] = _bisect(c, breaks[k], breaks[k + 1])
+            count += 1
+    return found[:count]
 
 
 @numba.njit(cache=True)
-def _touching(c: Array, breaks: Array, count: int, found: Array, total: int) -> int:
-    """Append breaks at which the polynomial all but vanishes, then put all roots into [0, 1]; returns their number."""
-    for k in range(count):
-        near = abs(_value(c, breaks[k])) < TOUCHING
-        for j in range(total):
-            near = near and abs(found[j] - breaks[k]) > ZERO
+def _with_touching(c: Array, breaks: Array, crossed: Array) -> Array:
+    """The roots where the sign changes, and the breaks at which the polynomial all but vanishes, put into [0, 1]."""
+    found, count = np.empty(len(crossed) + len(breaks)), len(crossed)
+    found[:count] = crossed
+    for place in breaks:
+        near = abs(_value(c, place)) < TOUCHING
+        for root in found[:count]:
+            near = near and abs(root - place) > ZERO
         if near:
-            found[total] = breaks[k]
-            total += 1
-    for j in range(total):
-        found[j] = min(max(found[j], 0.0), 1.0)
-    return total
+            found[count] = place
+            count += 1
+    for k in range(count):
+        found[k] = min(max(found[k], 0.0), 1.0)
+    return found[:count]
 
 
 @numba.njit(cache=True)

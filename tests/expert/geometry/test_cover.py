@@ -44,3 +44,11 @@ def test_clip_equals_intersection() -> None:
         truth = shapely.Polygon(a).intersection(shapely.Polygon(b))
         area = shapely.Polygon(ours).area if len(ours) >= 3 else 0.0
         assert area == pytest.approx(truth.area, abs=1e-12)
+
+
+def test_clip_writes_no_more_corners_than_it_has_room_for() -> None:
+    """A zigzag, which no convex polygon is, crosses the line at every edge."""
+    zigzag = np.array([[k, (-1.0) ** k] for k in range(20)])
+    cut = clip(zigzag, np.array([[0.0, 1.0]]), np.array([0.0]))
+    assert len(cut) == 10 + 20
+    assert (cut[:, 1] <= 0).all()

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from expert.errors import SolverFailed
 from expert.geometry.pose import Array
 from expert.grasping.sweeping import sweep
 from expert.verify.grasp.dead_ends import DeadEndEvent, dead_end_events
 from expert.verify.grasp.event_kernel import TOUCH
 from expert.verify.grasp.finger_path import FingerPath
-from expert.verify.grasp.unit_roots import roots_in_unit
 from expert.world.named import named_shape
 from expert.world.shape import Shape
 from tests.support.experiments import closing_path
@@ -80,15 +80,11 @@ def test_parallel_contacts_close_where_two_push_against_one() -> None:
     assert [e.s for e in tilted] == pytest.approx([(6.1 - height) / 5], abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("roots", "inside"),
-    [((0.2, 0.7, 2.0, -1.0), [0.2, 0.7]), ((0.4, 0.4, 3.0, 5.0), [0.4]), ((0.0, 1.0), [0, 1])],
-)
-def test_roots_in_the_unit_interval_are_found(roots: tuple[float, ...], inside: list[float]) -> None:
-    coefficients = np.polynomial.polynomial.polyfromroots(roots)
-    found = np.empty(8)
-    count = roots_in_unit(np.ascontiguousarray(coefficients), found)
-    assert {round(x, 5) for x in found[:count]} == {round(x, 5) for x in inside}
+def test_more_dead_ends_than_can_be_listed_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    path = path_of(BOX, [[[0.5, -3], [0.5, 3]], [[0.5, 0], [0.5, 0]]])
+    monkeypatch.setattr("expert.verify.grasp.dead_ends.MOST", 3)
+    with pytest.raises(SolverFailed, match="more than 3 dead ends"):
+        dead_end_events(path)
 
 
 def test_nothing_near_a_dead_end_is_free_beyond_it() -> None:
