@@ -22,10 +22,12 @@ from expert.geometry.cover import clip, half_planes, overlapping_cover
 from expert.geometry.polygon import simple_polygon
 from expert.geometry.pose import Array, rotation
 from expert.problems.cage import Arrangement
+from expert.verify.cage.parts import TOLERANCE, inside_parts
 from expert.world.frame import Frame
 
 INNER_MARGIN = 1e-6
-"""Inner shapes are eroded by this, so that neither rounding nor the start tolerance can turn an escape into a cage."""
+"""Inner shapes are eroded by this, so that neither rounding, nor parts that reach outside by their tolerance, nor the start
+tolerance can turn an escape into a cage."""
 TURN = 45 * 128
 """Cell bounds are whole units of 1 / TURN of a full turn (0.0625 degrees) beyond the start orientation."""
 COARSEST = 128
@@ -210,16 +212,25 @@ def _common(a: Geometries, b: Geometries) -> Geometries:
 
 @lru_cache(maxsize=64)
 def _relative_cover(vertices: bytes, centre: tuple[float, float], radius: float) -> tuple[Array, ...]:
+    return tuple(overlapping_cover(_relative_polygon(vertices, centre, radius)))
+
+
+@lru_cache(maxsize=64)
+def _sure_parts(vertices: bytes, centre: tuple[float, float], radius: float) -> tuple[Array, ...]:
+    polygon = _relative_polygon(vertices, centre, radius)
+    return tuple(inside_parts(polygon, _relative_cover(vertices, centre, radius)))
+
+
+def _relative_polygon(vertices: bytes, centre: tuple[float, float], radius: float) -> Array:
     polygon = (np.frombuffer(vertices).reshape(-1, 2) - np.array(centre)) / radius
-    return tuple(overlapping_cover(simple_polygon(polygon, field="object.vertices")))
+    return simple_polygon(polygon, field="object.vertices")
 
 
 @lru_cache(maxsize=256)
 def _inner_shape(
     vertices: bytes, centre: tuple[float, float], radius: float, half: float, erosion: float
 ) -> SweptShape:
-    cover = _relative_cover(vertices, centre, radius)
-    return _swept([inner_piece(piece, half, erosion) for piece in cover])
+    return _swept([inner_piece(part, half, erosion) for part in _sure_parts(vertices, centre, radius)])
 
 
 @lru_cache(maxsize=256)
@@ -236,14 +247,18 @@ def _swept(parts: list[Array]) -> SweptShape:
 
 
 def inner_piece(piece: Array, half: float, erosion: float = 0.0) -> Array:
-    """Convex subset (v, 2), possibly empty, of R(t) piece for all |t| <= half, eroded."""
+    """Convex subset (v, 2), possibly empty, of R(t) piece for all |t| <= half, eroded.
+
+    Its corners are compared with the half-planes that cut it out: empty where the clipping failed.
+    """
     normals, offsets = half_planes(piece)
     offsets = offsets - erosion
     convex = offsets > 0  # the arc of tangent points bulges outward: cut it by its chord
     cut_normals = np.concatenate([normals @ rotation(half).T, normals @ rotation(-half).T, normals[convex]])
     cut_offsets = np.concatenate([offsets, offsets, offsets[convex] * np.cos(half)])
     square = 2 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    return clip(square, cut_normals, cut_offsets)
+    part = clip(square, cut_normals, cut_offsets)
+    return part if (part @ cut_normals.T <= cut_offsets + TOLERANCE).all() else part[:0]
 
 
 def outer_piece(piece: Array, half: float) -> Array:
