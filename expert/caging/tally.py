@@ -7,8 +7,9 @@ from expert.caging.requirements import objective
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
 from expert.problems.cage import CageProblem, CageSolution, Meeting
-from expert.verify.cage.check import CageReport, verify_cage
+from expert.verify.cage.check import verify_cage
 from expert.verify.cage.claims import unmet_claim
+from expert.verify.cage.report import CageReport
 
 
 @dataclass

@@ -21,7 +21,8 @@ from expert.drawing.canvas import (
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, to_world
 from expert.problems.cage import Arrangement, CageProblem, CageSolution
-from expert.verify.cage.check import CageReport, verify_cage
+from expert.verify.cage.check import verify_cage
+from expert.verify.cage.report import CageReport
 
 VIEWS = ("workspace", "slice", "component")
 RATE = 12.0

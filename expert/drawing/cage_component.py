@@ -9,7 +9,7 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from expert.drawing.canvas import FINGER
 from expert.geometry.pose import Array
 from expert.problems.cage import Arrangement
-from expert.verify.cage.check import CageReport
+from expert.verify.cage.report import CageReport
 from expert.world.slices import free_components
 
 PATH = "#1f5fbf"

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from expert.drawing.canvas import EDGE, OBJECT, WALL, framed_axes, scale_bar
 from expert.geometry.pose import Array, cross, to_world
 from expert.problems.cage import Arrangement, CageProblem
-from expert.verify.cage.check import CageReport
+from expert.verify.cage.report import CageReport
 
 FINGERS = ("#c8102e", "#1a8a3c", "#7a4fb5", "#d9822b", "#0e8c9c", "#b5527a", "#6b6b2f")
 """One colour each, here and in slices."""

@@ -21,10 +21,11 @@ from rich.table import Table
 
 from expert.geometry.pose import Array, to_world
 from expert.problems.cage import Arrangement
-from expert.verify.cage.check import CageReport, verify_cage
+from expert.verify.cage.check import verify_cage
 from expert.verify.cage.escape import escape_fault
-from expert.verify.cage.refute import random_escape
+from expert.verify.cage.report import CageReport
 from tests.support.arrangements import random_arrangement, transformed, with_finger
+from tests.support.refuter import random_escape
 
 MEDIAN_BAR, P99_BAR = 0.020, 1.0
 

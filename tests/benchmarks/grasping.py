@@ -40,7 +40,7 @@ def _certificate(study: Study, name: str, degrees: float) -> Row:
     }  # fmt: skip
     if len(answer.path):
         report = moved_report(problem, answer)
-        row |= {"verdict": report.verdict, "dead_end_seconds": report.seconds.get("dead_ends", np.nan)}
+        row |= {"verdict": report.verdict, "dead_end_seconds": report.spent.get("dead_ends", np.nan)}
         row["dead_ends"] = report.dead_ends.verdict if report.dead_ends else None
         area = report.start.area if report.start else 0.0
         row["area"] = area / mass_properties(problem.shape.vertices).area

@@ -8,62 +8,16 @@ Overlays in plain doubles are fast and very rarely wrong, so no cage rests on th
 overlays on a grid, which are robust, and where the two disagree the whole search is.
 """
 
-import time
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import replace
 
 import numpy as np
 
+from expert.budget import Budget
 from expert.errors import InvalidProblem
-from expert.geometry.pose import Array
 from expert.problems.cage import Arrangement, CageProblem, CageSolution
 from expert.verify.cage.claims import unmet_claim
-from expert.verify.cage.search import UNIT, CageSearch, Verdict
-
-
-@dataclass(frozen=True, kw_only=True)
-class CageReport:
-    """What was shown.
-
-    rotation_range: orientations [rad] that the object can reach at most (caged); (-inf, inf) where it may turn for good.
-    path: body poses (K, 3) of an escape; neighbours differ by a translation or by a rotation about a fixed point.
-    resolution: half-width [rad] of the smallest cell.  cells: how many were computed.
-    reason: why an answer was refuted before its cage was looked at: its grippers cannot do it, or its cost is another.
-    """
-
-    verdict: Verdict | Literal["refuted"]
-    cells: int
-    resolution: float
-    seconds: float
-    rotation_range: tuple[float, float] | None = None
-    path: Array = field(default_factory=lambda: np.empty((0, 3)))
-    reason: str = ""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain JSON values; an unlimited rotation_range is null."""
-        limited = self.rotation_range is not None and np.isfinite(self.rotation_range).all()
-        return {
-            "verdict": self.verdict,
-            "rotation_range": list(self.rotation_range) if self.rotation_range and limited else None,
-            "turns_freely": self.rotation_range is not None and not limited,
-            "cells": self.cells,
-            "resolution": self.resolution,
-            "seconds": self.seconds,
-            "path": self.path.tolist(),
-            "reason": self.reason,
-        }
-
-    def __str__(self) -> str:
-        cells = f"{self.cells} cells, half-width down to {np.degrees(self.resolution):.3g} deg"
-        if self.verdict == "escapes":
-            return f"escapes: a collision-free path of {len(self.path)} poses, checked exactly ({cells})"
-        if self.verdict == "refuted":
-            return f"refuted: {self.reason}"
-        if self.verdict == "unknown":
-            return f"unknown: inner and outer approximations still disagree ({cells})"
-        low, high = np.degrees(self.rotation_range or (-np.inf, np.inf))
-        turn = f"orientations within [{low:.4g}, {high:.4g}] deg" if np.isfinite(low) else "any orientation"
-        return f"caged: {turn} ({cells})"
+from expert.verify.cage.report import CageReport
+from expert.verify.cage.search import UNIT, CageSearch
 
 
 def verify_cage(
@@ -83,7 +37,7 @@ def verify_cage(
     within: orientations [rad], relative to the start, that the cage is expected to keep: looked at more closely where it
     seems to leave them.
     """
-    began = time.perf_counter()
+    budget = Budget(np.inf)
     search = CageSearch(arrangement, slack, max(1, round(2 * finest / UNIT)))
     verdict, path = search.run(range_resolution, cell_budget, within)
     doubted = search.faults > 0 if verdict == "unknown" else verdict == "caged" and not search.holds_on_grid()
@@ -94,7 +48,7 @@ def verify_cage(
         verdict=verdict,
         cells=search.complex.evaluated,
         resolution=0.5 * UNIT * min(cell.width for cell in search.ahead if cell.width),
-        seconds=time.perf_counter() - began,
+        seconds=budget.spent,
         rotation_range=search.rotation_range() if verdict == "caged" else None,
         path=path,
     )
@@ -116,5 +70,5 @@ def verify(task: Arrangement | CageProblem, answer: CageSolution | None = None) 
             "status", expected="caged", got=answer.status, remedy="there is no claim to check"
         )
     if claim := unmet_claim(task, answer):
-        return CageReport(verdict="refuted", cells=0, resolution=np.pi, seconds=0.0, reason=claim)
-    return verify_cage(task.arrangement(answer.fingers))
+        return CageReport(verdict="refuted", claim=answer.status, reason=claim)
+    return replace(verify_cage(task.arrangement(answer.fingers)), claim=answer.status)

@@ -12,13 +12,13 @@ end        contacts in form closure, and of all that can be reached only the goa
 start      Q0, from inside
 """
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
+from expert.budget import Budget
 from expert.errors import InvalidProblem, SolverFailed
 from expert.geometry.pose import Array, wrapped
 from expert.problems.cage import START_TOLERANCE
@@ -60,7 +60,7 @@ def verify(task: GraspProblem, answer: GraspSolution | None = None) -> GraspRepo
         raise InvalidProblem(
             "status", expected="finger paths", got=answer.status, remedy="there is no claim to check"
         )
-    return verify_grasp(task, answer.path, answer.facets)
+    return replace(verify_grasp(task, answer.path, answer.facets), claim=answer.status)
 
 
 def verify_grasp(
@@ -89,7 +89,7 @@ class _Check:
         self.problem, self.path, self.facets = problem, path, facets
         self.refuted: list[str] = []
         self.doubts: list[str] = []
-        self.seconds: dict[str, float] = {}
+        self.spent: dict[str, float] = {}
         self.end: EndGrasp | None = None
         self.start: StartSet | None = None
         self.cages: Cages | None = None
@@ -107,16 +107,16 @@ class _Check:
             "dead_ends": jams,
         }
         for name, step in steps.items():
-            began = time.process_time()
+            part = Budget(np.inf)
             step()
-            self.seconds[name] = time.process_time() - began
+            self.spent[name] = part.spent
             if (self.refuted or self.doubts) and (name == "path" or not full):
                 break
         verdict: Verdict = "refuted" if self.refuted else "unknown" if self.doubts else "certified"
         reason = "; ".join(self.refuted or self.doubts)
         return GraspReport(
             verdict=verdict, reason=reason, cages=self.cages, dead_ends=self.dead_ends, end=self.end,
-            start=self.start, seconds=self.seconds,
+            start=self.start, seconds=sum(self.spent.values()), spent=self.spent,
         )  # fmt: skip
 
     def check_path(self) -> None:
@@ -172,17 +172,17 @@ class _Check:
         except SolverFailed as error:
             self.doubts.append(str(error))
             return
-        deadline = time.process_time() + time_limit
+        budget = Budget(time_limit)
         tube, pockets = Tube(leak=(0.0, 0.0)), self._pockets(events)
         for coarsest in (COARSEST >> (2 * k) for k in range(ROUNDS)):
-            finer = self._tube(coarsest, deadline, pockets)
+            finer = self._tube(coarsest, budget, pockets)
             if tube.closed and not finer.closed:
                 break  # no time: the coarse answer stands
             tube = finer
             jams = [self._dead_end(e) for e in events if tube.meets(e.s, e.first, e.last)]
             alone = tube.closed and self._alone(tube)
             sure = any(jam.witness is not None for jam in jams)
-            if sure or (alone and not jams) or time.process_time() > deadline:
+            if sure or (alone and not jams) or budget.over:
                 break
         self._record(tube, jams, len(events), alone)
         self._conclude(tube, jams, alone)
@@ -194,17 +194,17 @@ class _Check:
             self.path, [event for event in events if abs(wrapped(event.first[2])) <= widest]
         )
 
-    def _tube(self, coarsest: int, deadline: float, pockets: Pockets) -> Tube:
+    def _tube(self, coarsest: int, budget: Budget, pockets: Pockets) -> Tube:
         """What can be reached, with cells of at most this width.
 
         Mostly it stays within the half-ranges all the way, and out of the pockets of dead ends, which is the easier to show
         the tighter the ranges are.  What jams does neither; then the first range bounds everything.
         """
         half_ranges = self.problem.half_ranges[:-1]
-        tube = reach_tube(self.path, half_ranges + TIGHT, coarsest, deadline, pockets)
-        if not tube.closed and time.process_time() <= deadline:
+        tube = reach_tube(self.path, half_ranges + TIGHT, coarsest, budget, pockets)
+        if not tube.closed and not budget.over:
             limits = np.full(len(half_ranges), half_ranges[0] + WIDE)
-            tube = reach_tube(self.path, limits, coarsest, deadline)
+            tube = reach_tube(self.path, limits, coarsest, budget)
         return tube
 
     def _record(self, tube: Tube, jams: list[DeadEnd], listed: int, alone: bool) -> None:

@@ -4,12 +4,12 @@ Slabs are as long as they can be: where the flood of one leaves the orientations
 are halved, and when they are no coarser than the fingers' motion, the slab is.
 """
 
-import time
 from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
 
+from expert.budget import Budget
 from expert.geometry.pose import Array
 from expert.verify.cage.cells import TURN, Cell
 from expert.verify.cage.search import UNIT
@@ -48,12 +48,12 @@ class Tube:
 
 
 def reach_tube(
-    path: FingerPath, limits: Array, coarsest: int, deadline: float, pockets: Pockets = NONE
+    path: FingerPath, limits: Array, coarsest: int, budget: Budget, pockets: Pockets = NONE
 ) -> Tube:
     """Flood from the goal's component at s = 0 to the end; orientations beyond a limit [rad] count as escaped.
 
     limits: for each segment between knots.  coarsest: width of the widest cells, in units of the cage verifier; below
-    COARSEST fingers move by no more in a slab.  deadline: processor time at which to give up.  pockets: what reaches them
+    COARSEST fingers move by no more in a slab.  budget: when it is over the tube is given up.  pockets: what reaches them
     counts as escaped.
     """
     tube = Tube()
@@ -72,7 +72,7 @@ def reach_tube(
         slab = settled_slab(path, s, high, ring, sources, limits[int(s)], pockets.at(s, high))
         if slab is None:
             stride = 0.5 * (high - s)
-        if time.process_time() > deadline or (slab is None and _motion(path, s, high) < 2 * shortest):
+        if budget.over or (slab is None and _motion(path, s, high) < 2 * shortest):
             tube.leak = s, high
             return tube
         if slab is not None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from expert.geometry.pose import Array
 from expert.verify.grasp.start_set import StartSet
+from expert.verify.report import Report
 
 Verdict = Literal["certified", "refuted", "unknown"]
 
@@ -146,35 +147,32 @@ class EndGrasp:
 
 
 @dataclass(frozen=True, kw_only=True)
-class GraspReport:
-    """Verdict on a finger path; parts that were not looked at are None.  seconds: processor time by part."""
+class GraspReport(Report):
+    """Verdict on a finger path; parts that were not looked at are None.  spent: processor time [s] by part."""
+
+    certificate = "certified_grasp"
 
     verdict: Verdict
-    reason: str = ""
     cages: Cages | None = None
     dead_ends: DeadEnds | None = None
     end: EndGrasp | None = None
     start: StartSet | None = None
-    seconds: dict[str, float] = field(default_factory=dict)
+    spent: dict[str, float] = field(default_factory=dict)
 
     @property
     def certified(self) -> bool:
         """Whether every start in Q0 ends at the goal."""
         return self.verdict == "certified"
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain JSON values: the certificate."""
+    def evidence(self) -> dict[str, Any]:
+        """The parts."""
         parts = {"cages": self.cages, "dead_ends": self.dead_ends, "end": self.end, "start": self.start}
-        return {
-            "schema": 1,
-            "certificate": "certified_grasp",
-            "verdict": self.verdict,
-            "reason": self.reason,
-            **{name: part.as_dict() if part else None for name, part in parts.items()},
-            "seconds": self.seconds,
+        return {name: part.as_dict() if part else None for name, part in parts.items()} | {
+            "spent": self.spent
         }
 
-    def __str__(self) -> str:
+    def lines(self) -> list[str]:
+        """The verdict, then the parts."""
         head = f"{self.verdict}: {self.reason or 'every start in Q0 ends at the goal'}"
         parts = (self.cages, self.dead_ends, self.end, self.start)
-        return "\n".join([head, *(str(part) for part in parts if part is not None)])
+        return [head, *(str(part) for part in parts if part is not None)]

@@ -41,7 +41,7 @@ def verify(task: ContactTask, answer: Plan | None) -> PlanReport:
     if answer.status == "infeasible":
         return check_infeasible(task)
     return PlanReport(
-        verdict="unknown", claim=answer.status, note="the solver found no plan; nothing to check"
+        verdict="unknown", claim=answer.status, reason="the solver found no plan; nothing to check"
     )
 
 
@@ -49,10 +49,10 @@ def check_infeasible(task: ContactTask) -> PlanReport:
     """sound where some step admits no force balance at all; unknown where each step does, taken by itself."""
     step = first_unbalanced_step(task)
     if step is not None:
-        note = f"no finger placement balances the forces at step {step}"
-        return PlanReport(verdict="sound", claim="infeasible", note=note)
-    note = "every step by itself admits a force balance; contact sequences are not searched"
-    return PlanReport(verdict="unknown", claim="infeasible", note=note)
+        reason = f"no finger placement balances the forces at step {step}"
+        return PlanReport(verdict="sound", claim="infeasible", reason=reason)
+    reason = "every step by itself admits a force balance; contact sequences are not searched"
+    return PlanReport(verdict="unknown", claim="infeasible", reason=reason)
 
 
 def check_plan(task: ContactTask, plan: Plan, tolerances: Tolerances | None = None) -> PlanReport:

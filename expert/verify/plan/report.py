@@ -1,10 +1,12 @@
 """What a checker of plans answers: every law by name, with its largest violation and where it occurs."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+
+from expert.verify.report import Report
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,13 +53,13 @@ class Check:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlanReport:
-    """Verdict on an answer: sound, refuted by the checks that are not ok, or unknown for the reason in `note`."""
+class PlanReport(Report):
+    """Sound, refuted by the checks that are not ok, or unknown."""
+
+    certificate = "contact_trajectory"
 
     verdict: Literal["sound", "refuted", "unknown"]
-    claim: str
-    checks: tuple[Check, ...] = field(default=())
-    note: str = ""
+    checks: tuple[Check, ...] = ()
 
     @property
     def violations(self) -> tuple[Check, ...]:
@@ -68,17 +70,13 @@ class PlanReport:
         """The check of that name.  Raises KeyError."""
         return {check.name: check for check in self.checks}[name]
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain JSON values: the certificate file."""
-        return {
-            "schema": 1,
-            "certificate": "contact_trajectory",
-            "verdict": self.verdict,
-            "claim": self.claim,
-            "note": self.note,
-            "checks": [check.as_dict() for check in self.checks],
-        }
+    def evidence(self) -> dict[str, Any]:
+        """Every law."""
+        return {"checks": [check.as_dict() for check in self.checks]}
 
-    def __str__(self) -> str:
-        lines = [f"{self.verdict}: {self.claim}" + (f" ({self.note})" if self.note else "")]
-        return "\n".join([*lines, *map(str, self.checks)])
+    def lines(self) -> list[str]:
+        """The verdict, then every law."""
+        return [
+            f"{self.verdict}: {self.claim}" + (f" ({self.reason})" if self.reason else ""),
+            *map(str, self.checks),
+        ]

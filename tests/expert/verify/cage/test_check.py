@@ -8,11 +8,11 @@ from expert.geometry.pose import Array, rotation, to_world
 from expert.problems.cage import Arrangement
 from expert.verify.cage.check import verify_cage
 from expert.verify.cage.escape import escape_fault
-from expert.verify.cage.refute import random_escape
 from expert.world.named import named_shape
 from expert.world.shape import Shape
 from expert.world.walls import segments
 from tests.support.arrangements import random_arrangement, transformed, with_finger
+from tests.support.refuter import random_escape
 
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from expert.budget import Budget
 from expert.grasping.proposals import Search, goal_cells
 from expert.problems.grasp import GraspProblem
 from expert.verify.grasp.check import verify_grasp
@@ -41,8 +42,8 @@ def test_a_flood_that_knows_the_pockets_keeps_out_of_them_with_cells_as_wide() -
     assert verify_grasp(problem, path.knots_w, time_limit=np.inf).verdict == "certified"
     events = [e for e in dead_end_events(path) if abs(e.first[2]) < HALF_RANGES[0]]
     limits = HALF_RANGES[:-1] + np.radians(2)
-    blind = reach_tube(path, limits, COARSEST, np.inf)
-    aware = reach_tube(path, limits, COARSEST, np.inf, Pockets.before(path, events))
+    blind = reach_tube(path, limits, COARSEST, Budget(np.inf))
+    aware = reach_tube(path, limits, COARSEST, Budget(np.inf), Pockets.before(path, events))
     assert blind.closed
     assert aware.closed
     assert any(blind.meets(e.s, e.first, e.last) for e in events)

@@ -279,7 +279,7 @@ def one_finger_cannot_lift() -> ContactTask:
 def test_infeasibility_is_proved_without_the_solver_where_one_step_suffices() -> None:
     report = check_infeasible(one_finger_cannot_lift())
     assert report.verdict == "sound"
-    assert "step 0" in report.note
+    assert "step 0" in report.reason
 
 
 @pytest.mark.parametrize("made", [sliding_block, lifted_block, pushed_block])
