@@ -55,7 +55,7 @@ def test_the_search_for_cycles_finds_one() -> None:
 
 
 def test_the_imports_of_files_are_found() -> None:
-    assert "expert.geometry.pose" in IMPORTS["expert.mechanics"]
+    assert "expert.geometry.pose" in IMPORTS["expert.world.frame"]
     assert "expert.errors" in IMPORTS["expert.__main__"]
     assert all(names <= MODULES.keys() for names in IMPORTS.values())
     assert sum(map(len, IMPORTS.values())) > len(MODULES)
