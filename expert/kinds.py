@@ -1,20 +1,9 @@
-"""What this package can read, solve, check and draw: one row per problem kind.
+"""What this package can solve, check and draw: one class per problem kind; `expert.files` reads and writes their files.
 
-Functions are named as "module:function" and imported when first called, so that a checker never loads a solver.
-
-A kind's `format` module has
-    read(data) -> (task, options)            the whole file as a mapping; raises InvalidProblem
-    answer_fields(problem, answer) -> dict   status first, then whatever the kind documents; plain JSON values
-    read_answer(problem, data) -> answer     the same mapping, checked
-and the other entries are
-    solve(task, **options) -> answer         the answer has a `status`
-    verify(task, answer) -> Report           answer is None for a problem file
-    draw(task, answer, path)                 picture or animation by the suffix of path; draw(..., view=name) where it has views
+Imports stand inside the functions, so that a checker never loads a solver, and none of both a picture.
 """
 
-import importlib
-from collections.abc import Callable
-from dataclasses import dataclass
+import os
 from typing import Any, Protocol
 
 from expert.errors import InvalidProblem
@@ -34,55 +23,98 @@ class Report(Protocol):
         """Lines for a reader."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class Kind:
-    """Where the code of one problem kind lives.
+    """solved: statuses that count as success.
 
-    solved: statuses that count as success.  views: parts of its picture that can be drawn alone; such a kind also draws
-    problem files that state what there is to draw.
+    solve(task, **options) -> answer with a `status`; the options are those of the kind's dataclass (`FORMATS[kind].OPTIONS`).
+    verify(task, answer) -> Report; answer is None for a problem file that states what there is to check.
+    draw(task, answer, path): picture or animation by the suffix of path; answer likewise.  view: one part of the picture.
     """
 
-    format: str
-    solve: str
-    verify: str
-    draw: str
-    solved: tuple[str, ...] = ("optimal",)
-    views: tuple[str, ...] = ()
+    solved: tuple[str, ...]
 
-    def function(self, role: str) -> Callable[..., Any]:
-        """Import what this kind uses to `solve`, `verify` or `draw`, or a function of its `format` module."""
-        entry = getattr(self, role) if role in ("solve", "verify", "draw") else f"{self.format}:{role}"
-        module, _, name = entry.partition(":")
-        return getattr(importlib.import_module(module), name)
+    def solve(self, task: Any, **options: Any) -> Any:
+        raise NotImplementedError
+
+    def verify(self, task: Any, answer: Any) -> Report:
+        raise NotImplementedError
+
+    def draw(self, task: Any, answer: Any, path: str | os.PathLike[str], view: str | None = None) -> None:
+        raise NotImplementedError
+
+
+class ContactTrajectory(Kind):
+    """Thesis 3.1: where and with what forces do fingers make a motion?"""
+
+    solved = ("optimal",)
+
+    def solve(self, task: Any, **options: Any) -> Any:
+        from expert.contact.solve import solve
+
+        return solve(task, **options)
+
+    def verify(self, task: Any, answer: Any) -> Report:
+        from expert.verify.plan.check import verify
+
+        return verify(task, answer)
+
+    def draw(self, task: Any, answer: Any, path: str | os.PathLike[str], view: str | None = None) -> None:
+        from expert.drawing.contact_trajectory import draw
+
+        _require_no(view)
+        draw(task, answer, path)
+
+
+class Cage(Kind):
+    """Thesis 5.1: where do fingers stand so that an object cannot escape?"""
+
+    solved = ("caged",)
+
+    def solve(self, task: Any, **options: Any) -> Any:
+        from expert.caging.synthesis import solve
+
+        return solve(task, **options)
+
+    def verify(self, task: Any, answer: Any) -> Report:
+        from expert.verify.cage.check import verify
+
+        return verify(task, answer)
+
+    def draw(self, task: Any, answer: Any, path: str | os.PathLike[str], view: str | None = None) -> None:
+        from expert.drawing.cage import draw
+
+        draw(task, answer, path, view or "all")
+
+
+class CertifiedGrasp(Kind):
+    """Thesis 5.2: which finger paths push an object from anywhere nearby into one grasp?"""
+
+    solved = ("certified",)
+
+    def solve(self, task: Any, **options: Any) -> Any:
+        from expert.grasping.synthesis import solve
+
+        return solve(task, **options)
+
+    def verify(self, task: Any, answer: Any) -> Report:
+        from expert.verify.grasp.check import verify
+
+        return verify(task, answer)
+
+    def draw(self, task: Any, answer: Any, path: str | os.PathLike[str], view: str | None = None) -> None:
+        from expert.drawing.certified_grasp import draw
+
+        _require_no(view)
+        draw(task, answer, path)
+
+
+def _require_no(view: str | None) -> None:
+    if view:
+        raise InvalidProblem("view", expected="none for this kind", got=view)
 
 
 KINDS: dict[str, Kind] = {
-    "contact_trajectory": Kind(
-        format="expert.files.contact_trajectory",
-        solve="expert.contact:solve",
-        verify="expert.verify.plan.check:verify",
-        draw="expert.drawing.contact_trajectory:draw",
-    ),
-    "cage": Kind(
-        format="expert.files.cage",
-        solve="expert.caging.synthesis:solve",
-        verify="expert.verify.cage.check:verify",
-        draw="expert.drawing.cage:draw",
-        solved=("caged",),
-        views=("all", "workspace", "slice", "component"),
-    ),
-    "certified_grasp": Kind(
-        format="expert.files.certified_grasp",
-        solve="expert.grasping.synthesis:solve",
-        verify="expert.verify.grasp.check:verify",
-        draw="expert.drawing.certified_grasp:draw",
-        solved=("certified",),
-    ),
+    "contact_trajectory": ContactTrajectory(),
+    "cage": Cage(),
+    "certified_grasp": CertifiedGrasp(),
 }
-
-
-def kind_named(name: object, field: str) -> Kind:
-    """The row of a kind.  Raises InvalidProblem, naming `field`, for a kind that does not exist."""
-    if not isinstance(name, str) or name not in KINDS:
-        raise InvalidProblem(field, expected=" or ".join(KINDS), got=repr(name)[:60])
-    return KINDS[name]

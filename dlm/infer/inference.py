@@ -16,9 +16,7 @@ from dlm.simulator.replay import Replay, replay
 from dlm.structured import ClassPlanner, ExpertPlanner, Planned, StructuredModel
 from dlm.structured.trial import Trial
 from expert.errors import InvalidProblem
-from expert.files import problem_of
-from expert.files.contact_plan import answer_fields
-from expert.files.contact_task import task_fields
+from expert.files import problem_for, solution_fields
 from expert.geometry.polygon import diameter
 from expert.problems.contact import ContactTask, Plan
 from expert.world.values import require
@@ -107,9 +105,7 @@ class Inference:
         """Actions as a solution file, which `python -m expert verify|draw` and `python -m dlm.simulator` read."""
         if self.plan is None or self.task is None:
             raise InvalidProblem("plan", expected="a plan", got=f"none: {self.reason}")
-        data = task_fields(self.task, description="perceived in a video")
-        answer = answer_fields(problem_of(data), self.plan)
-        return {"schema": 1, "solution": "contact_trajectory", "problem": data, **answer}
+        return solution_fields(problem_for(self.task, description="perceived in a video"), self.plan)
 
 
 def infer(

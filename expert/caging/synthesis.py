@@ -8,7 +8,6 @@ import itertools
 import time
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -23,13 +22,18 @@ from expert.caging.thesis import ThesisModel, slices
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, to_world
 from expert.loops.swept import SweptGeometry
-from expert.mip.backends import Solver
-from expert.problems.cage import Arrangement, CageProblem, CageSolution, CageStatus
+from expert.problems.cage import (
+    Arrangement,
+    CageMethod,
+    CageOptions,
+    CageProblem,
+    CageSolution,
+    CageSolver,
+    CageStatus,
+)
 from expert.verify.cage.check import verify_cage
 from expert.world.frame import Frame
 
-Method = Literal["swept", "model", "thesis"]
-"""swept: the model, and immobilising grasps where it is slow; model: the model alone; thesis: MIP1."""
 LADDER = tuple((np.radians(a), np.radians(b)) for a, b in (
     (15, 15), (20, 20), (30, 30), (10, 10), (5, 5), (45, 45), (7, 7),
     (5, 25), (25, 5), (10, 40), (40, 10), (3, 3), (60, 60),
@@ -67,9 +71,9 @@ class Attempt:
 def solve(
     problem: CageProblem | Arrangement,
     *,
-    time_limit: float = 60.0,
-    method: Method = "swept",
-    solver: Solver = "highs",
+    time_limit: float = CageOptions.time_limit,
+    method: CageMethod = CageOptions.method,
+    solver: CageSolver = CageOptions.solver,
 ) -> CageSolution:
     """A verified cage, the best found within time_limit where there is a cost (Thesis 5.1, reformulated).
 
@@ -93,7 +97,7 @@ def solve(
     return tally.answer(time.thread_time() - began)
 
 
-def _fewest(problem: CageProblem, time_limit: float, method: Method, solver: Solver) -> CageSolution:
+def _fewest(problem: CageProblem, time_limit: float, method: CageMethod, solver: CageSolver) -> CageSolution:
     """The first count of fingers, from the least, for which a cage is found; each has an equal share of the time left."""
     began = time.thread_time()
     answers: dict[int, CageSolution] = {}
@@ -119,7 +123,7 @@ def _fewest(problem: CageProblem, time_limit: float, method: Method, solver: Sol
     )
 
 
-def _search_slices(tally: Tally, solver: Solver) -> None:
+def _search_slices(tally: Tally, solver: CageSolver) -> None:
     """MIP1 for one choice of slices after the other."""
     problem = tally.problem
     if len(problem.fixed) or len(problem.walls) or problem.grippers or problem.cost != "none":
@@ -139,7 +143,7 @@ def _search_slices(tally: Tally, solver: Solver) -> None:
         tally.exhausted[below, above] = _search(tally, model, frame, tally.left, solver)
 
 
-def _search_ranges(tally: Tally, method: Method, solver: Solver) -> None:
+def _search_ranges(tally: Tally, method: CageMethod, solver: CageSolver) -> None:
     """Swept models, and grasps, for one range of rotation after the other."""
     if tally.problem.count == 0:
         _judge_fixed(tally)
@@ -163,7 +167,7 @@ def _judge_fixed(tally: Tally) -> None:
         tally.keep(np.empty((0, 2)), report)
 
 
-def _attempts(problem: CageProblem, method: Method) -> Iterator[Attempt | None]:
+def _attempts(problem: CageProblem, method: CageMethod) -> Iterator[Attempt | None]:
     """A quick model, grasps (None), more quick models, then models of growing size and time."""
     plain = problem.cost == "none" and not _restricted(problem)
     if not plain and method != "model":
@@ -238,7 +242,7 @@ def _grasps(problem: CageProblem, rng: np.random.Generator) -> Iterator[Array]:
         yield fingers[order] if alike else fingers
 
 
-def _try_models(tally: Tally, attempt: Attempt, solver: Solver) -> None:
+def _try_models(tally: Tally, attempt: Attempt, solver: CageSolver) -> None:
     """Solve one model for each order of the loop; verify, and cut off what is refuted."""
     problem = tally.problem
     frame = Frame.of(problem.shape, problem.pose)
@@ -264,7 +268,7 @@ def _try_models(tally: Tally, attempt: Attempt, solver: Solver) -> None:
 
 
 def _search(
-    tally: Tally, model: SweptModel | ThesisModel, frame: Frame, seconds: float, solver: Solver
+    tally: Tally, model: SweptModel | ThesisModel, frame: Frame, seconds: float, solver: CageSolver
 ) -> bool:
     """Verify what the model proposes, and cut off what is refuted.  Whether it was proved to have no more to propose."""
     for _ in range(MOST_CUTS):

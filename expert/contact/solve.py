@@ -1,20 +1,18 @@
 """One entry for all methods of contact-trajectory optimization."""
 
-from typing import Literal, get_args
+from typing import get_args
 
 from expert.errors import InvalidProblem
-from expert.problems.contact import ContactTask, Plan
-
-Method = Literal["exact", "thesis", "scip"]
+from expert.problems.contact import ContactMethod, ContactOptions, ContactTask, Plan
 
 
 def solve(
     task: ContactTask,
     *,
-    method: Method = "exact",
-    gap: float = 1e-3,
-    time_limit: float = 60.0,
-    node_limit: int | None = None,
+    method: ContactMethod = ContactOptions.method,
+    gap: float = ContactOptions.gap,
+    time_limit: float = ContactOptions.time_limit,
+    node_limit: int | None = ContactOptions.node_limit,
     polish: bool = True,
 ) -> Plan:
     """Where and with what forces do fingers make this motion (Thesis 3.1)?  Positions [m], forces [N], or a proof.
@@ -36,4 +34,4 @@ def solve(
         from expert.contact import bilinear
 
         return bilinear.solve(task, gap=gap, time_limit=time_limit)
-    raise InvalidProblem("method", expected=f"one of {', '.join(get_args(Method))}", got=method)
+    raise InvalidProblem("method", expected=f"one of {', '.join(get_args(ContactMethod))}", got=method)

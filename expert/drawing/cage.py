@@ -38,12 +38,14 @@ def draw(
 
     The fingers are verified first, and an escape is drawn as such.  Raises InvalidProblem where there are no fingers.
     """
+    if view not in ("all", *VIEWS):
+        raise InvalidProblem("view", expected=" or ".join(("all", *VIEWS)), got=view)
+    views = VIEWS if view == "all" else (view,)
     arrangement = _arrangement(task, answer)
     report = verify_cage(arrangement)
     if suffix(path) in MOVING:
         _animate(arrangement, report, path)
         return
-    views = VIEWS if view == "all" else (view,)
     figure = new_figure(4.2 * len(views), 4.0)
     for k, name in enumerate(views):
         place = (1, len(views), k + 1)

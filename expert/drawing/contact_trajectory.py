@@ -24,6 +24,7 @@ from expert.drawing.canvas import (
     save_frames,
     suffix,
 )
+from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, to_body, to_world
 from expert.problems.contact import FREE, ContactTask, Plan
 
@@ -43,11 +44,15 @@ class Moment:
     """(where it acts, its arrow [m], colour)."""
 
 
-def draw(task: ContactTask, plan: Plan, path: str | os.PathLike[str]) -> None:
+def draw(task: ContactTask, plan: Plan | None, path: str | os.PathLike[str]) -> None:
     """Write a film strip (.png, .svg, .pdf: one panel per step) or an animation (.gif, .mp4).
 
-    Without a plan the desired motion is shown alone.  Raises InvalidProblem for any other suffix.
+    An answer without a plan shows the desired motion alone.  Raises InvalidProblem for any other suffix, and without answer.
     """
+    if plan is None:
+        raise InvalidProblem(
+            "solution", expected="a solution file", got="a problem file", remedy="solve it first"
+        )
     if suffix(path) in MOVING:
         save_frames(_frames(task, plan), path, rate=RATE)
     else:

@@ -1,68 +1,61 @@
-"""Files of `problem: certified_grasp`: mapping -> GraspProblem; GraspSolution <-> mapping.
+"""Files of `problem: certified_grasp`: GraspProblem and GraspSolution to and from mappings.
 
 Facets are numbered as the problem file lists its vertices, either way round; inside the package counter-clockwise.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from expert.errors import InvalidProblem
-from expert.files.cage import read_flag, read_grippers, require_size
-from expert.files.fields import Section, checked_array, shorten
-from expert.geometry.polygon import signed_area
+from expert.files.grippers import read_grippers, write_grippers
+from expert.files.objects import Numbering, read_pose, read_shape, write_shape
+from expert.files.problem import Problem
+from expert.files.section import Section, plain_keys, plain_values, shorten
 from expert.geometry.pose import Array
-from expert.problems.grasp import GraspProblem, GraspSolution, GraspStatus
-from expert.world.shape import Shape
+from expert.problems.grasp import LAST_RANGE, GraspOptions, GraspProblem, GraspSolution, schedule
 
-if TYPE_CHECKING:
-    from expert.files import Problem
-
-METHODS = ("goal_cell", "decomposed", "miqp1", "miqp2")
-COSTS = ("attraction", "acceleration")
-STATUSES: tuple[GraspStatus, ...] = ("certified", "uncertified", "none_found", "time_limit")
-DEFAULT_RANGE, LAST_RANGE = 15.0, 0.5
-"""Of the schedule of half-ranges [deg] that a single number stands for."""
+TASKS: tuple[type, ...] = (GraspProblem,)
+OPTIONS: type = GraspOptions
+KEYS: tuple[str, ...] = ("object", "pose", "fingers", "cost", "options")
+ANSWER_KEYS: tuple[str, ...] = (*plain_keys(GraspSolution), "path", "facets", "starts")
+_FINGERS = ("count", "parallel")
 
 
-def read(data: dict[str, Any]) -> tuple[GraspProblem, dict[str, Any]]:
-    """The task that a file describes and keyword options for the solver.  Raises InvalidProblem."""
-    file = Section(
-        data, "", ("schema", "problem", "description", "object", "pose", "fingers", "cost", "options")
-    )
-    file.text("description", "")
-    vertices = file.section("object", ("vertices",)).array("vertices", (None, 2))
-    require_size("object.vertices", vertices)
-    fingers = file.section("fingers", ("count", "grippers", "parallel"), optional=True)
-    options = file.section("options", ("half_ranges", "margin", "time_limit", "method"), optional=True)
+def read(file: Section) -> tuple[GraspProblem, dict[str, Any]]:
+    """The task that a file describes and options for the solver.  Raises InvalidProblem."""
+    shape = read_shape(file.section("object", ("vertices",)))
+    fingers = file.section("fingers", ("grippers", *_FINGERS), optional=True)
+    options = file.section("options", ("half_ranges", "margin", *plain_keys(OPTIONS)), optional=True)
+    ranges: dict[str, Any] = {"half_ranges": _read_half_ranges(options)} if "half_ranges" in options else {}
     problem = GraspProblem(
-        shape=Shape(vertices=vertices),
-        pose=file.array("pose", (3,)) if "pose" in file else np.zeros(3),
-        count=fingers.integer("count", 4),
+        shape=shape,
+        pose=read_pose(file),
         grippers=read_grippers(fingers),
-        parallel=read_flag(fingers, "parallel"),
-        half_ranges=np.radians(_read_half_ranges(options)),
-        cost=file.choice("cost", COSTS, "attraction"),  # type: ignore[arg-type]
-        margin=options.number("margin", 0.001),
+        **ranges,
+        **fingers.values(GraspProblem, _FINGERS),
+        **file.values(GraspProblem, ("cost",)),
+        **options.values(GraspProblem, ("margin",)),
     )
-    return problem, {
-        "time_limit": options.number("time_limit", 60.0, positive=True),
-        "method": options.choice("method", METHODS, "goal_cell"),
+    return problem, options.values(OPTIONS)
+
+
+def write(task: GraspProblem) -> dict[str, Any]:
+    """What `read` reads."""
+    options = {"half_ranges": np.degrees(task.half_ranges).tolist(), "margin": task.margin}
+    return {
+        "object": write_shape(task.shape),
+        "pose": task.pose.tolist(),
+        "fingers": {**plain_values(task, _FINGERS), "grippers": write_grippers(task.grippers)},
+        "cost": task.cost,
+        "options": options,
     }
 
 
-def schedule(first: float) -> Array:
-    """The default half-ranges [deg] for the largest of them: equal steps down to a quarter, then LAST_RANGE."""
-    return np.array([first, 0.75 * first, 0.5 * first, 0.25 * first, LAST_RANGE])
-
-
 def _read_half_ranges(options: Section) -> Array:
-    """Degrees: a list, or the first one of the default schedule."""
-    value = options.data.get("half_ranges")
-    if value is None:
-        return schedule(DEFAULT_RANGE)
-    if isinstance(value, list):
-        return checked_array(value, (None,), options.path("half_ranges"))
+    """Radians, from degrees: a list, or the first one of the usual schedule."""
+    if isinstance(options.data["half_ranges"], list):
+        return np.radians(options.array("half_ranges", (None,)))
     first = options.number("half_ranges")
     if not first > 4 * LAST_RANGE:
         raise InvalidProblem(
@@ -71,62 +64,41 @@ def _read_half_ranges(options: Section) -> Array:
             got=f"{first:g}",
             remedy="list all half-ranges for a narrower schedule",
         )
-    return schedule(first)
+    return np.radians(schedule(first))
 
 
-def answer_fields(problem: "Problem", answer: GraspSolution) -> dict[str, Any]:
+def answer_fields(problem: Problem, answer: GraspSolution) -> dict[str, Any]:
     """The answer as plain JSON values."""
+    facets = Numbering.of(problem.data).facets(np.array(answer.facets, dtype=np.int64))
     return {
-        "status": answer.status,
-        "method": answer.method,
+        **plain_values(answer),
         "path": answer.path.tolist(),
-        "facets": [_renumbered(problem, facet) for facet in answer.facets],
+        "facets": facets.tolist(),
         "starts": answer.starts.tolist(),
-        "objective": float(answer.objective) if np.isfinite(answer.objective) else None,
-        "seconds": answer.seconds,
-        "refuted": answer.refuted,
-        "reason": answer.reason,
     }
 
 
-def read_answer(problem: "Problem", data: dict[str, Any]) -> GraspSolution:
+def read_answer(problem: Problem, file: Section) -> GraspSolution:
     """The answer of a solution file, checked for form (its truth is what `expert.verify.grasp.check` checks)."""
-    keys = ("status", "method", "path", "facets", "starts", "objective", "seconds", "refuted", "reason")
-    file = Section(data, "", keys)
-    task: GraspProblem = problem.task
-    status: Any = file.choice("status", STATUSES)
+    summary, task = file.values(GraspSolution), problem.task
     path = np.empty((0, task.count, 2))
-    if status in ("certified", "uncertified") or file.data.get("path"):
+    if summary["status"] in ("certified", "uncertified") or file.data.get("path"):
         path = file.array("path", (len(task.half_ranges), task.count, 2))
     return GraspSolution(
-        status=status,
+        **summary,
         path=path,
         facets=_read_facets(file, problem) if len(path) else (),
         starts=file.array("starts", (None, 2)) if file.data.get("starts") else np.empty((0, 2)),
-        objective=file.number("objective", np.nan),
-        method=file.text("method", ""),
-        seconds=file.number("seconds", 0.0),
-        refuted=file.integer("refuted", 0),
-        reason=file.text("reason", ""),
     )
 
 
-def _read_facets(file: Section, problem: "Problem") -> tuple[int, ...]:
+def _read_facets(file: Section, problem: Problem) -> tuple[int, ...]:
     """One facet index per finger; an empty list where the method names none."""
-    listed = file.data.get("facets", [])
-    task: GraspProblem = problem.task
-    facets = len(task.shape.vertices)
-    if not isinstance(listed, list) or len(listed) not in (0, task.count):
-        raise InvalidProblem("facets", expected=f"a list of {task.count} facet indices", got=shorten(listed))
+    listed, count, numbering = file.data.get("facets", []), problem.task.count, Numbering.of(problem.data)
+    if not isinstance(listed, list) or len(listed) not in (0, count):
+        raise InvalidProblem("facets", expected=f"a list of {count} facet indices", got=shorten(listed))
     for n, facet in enumerate(listed):
-        if isinstance(facet, bool) or not isinstance(facet, int) or not 0 <= facet < facets:
-            raise InvalidProblem(
-                f"facets[{n}]", expected=f"a facet index from 0 to {facets - 1}", got=shorten(facet)
-            )
-    return tuple(_renumbered(problem, facet) for facet in listed)
-
-
-def _renumbered(problem: "Problem", facet: int) -> int:
-    """From the file's numbering to the package's, and back by the same rule."""
-    listed = np.array(problem.data["object"]["vertices"], dtype=float)
-    return -(facet + 1) % len(listed) if signed_area(listed) < 0 else int(facet)
+        if type(facet) is not int or not 0 <= facet < numbering.count:
+            what = f"a facet index from 0 to {numbering.count - 1}"
+            raise InvalidProblem(f"facets[{n}]", expected=what, got=shorten(facet))
+    return tuple(numbering.facets(np.array(listed, dtype=np.int64)).tolist())

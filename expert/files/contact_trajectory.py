@@ -1,4 +1,4 @@
-"""Files of `problem: contact_trajectory`: mapping -> ContactTask, and by `contact_plan` Plan <-> mapping.
+"""Files of `problem: contact_trajectory`: ContactTask and Plan to and from mappings.
 
 The file's body frame may have any origin and list its vertices either way round.  Inside the package the origin is the
 centre of mass and the order counter-clockwise: converted here, once.
@@ -7,89 +7,77 @@ centre of mass and the order counter-clockwise: converted here, once.
 from typing import Any
 
 import numpy as np
-import shapely
 
 from expert.errors import InvalidProblem
-from expert.files.contact_plan import answer_fields, read_answer
-from expert.files.fields import SMALLEST, Section, shorten
-from expert.geometry.polygon import mass_properties, simple_polygon
-from expert.geometry.pose import Array, moved_origin
-from expert.problems.contact import ContactTask, Cost, Robustness
+from expert.files.objects import Numbering, read_body, write_body
+from expert.files.problem import Problem
+from expert.files.section import Section, jsonable, plain_keys, plain_values, shorten
+from expert.files.walls import read_walls, write_walls
+from expert.geometry.pose import Array, moved_origin, to_world
+from expert.problems.contact import (
+    FREE,
+    SUPPORT,
+    ContactForce,
+    ContactOptions,
+    ContactTask,
+    Cost,
+    Plan,
+    Robustness,
+)
 from expert.world.environment import Environment
 from expert.world.fingers import Fingers
 from expert.world.motion import Trajectory
-from expert.world.shape import Body
+from expert.world.values import IntArray
 from expert.world.walls import HalfPlane
 
-__all__ = ["answer_fields", "read", "read_answer"]
+TASKS: tuple[type, ...] = (ContactTask,)
+OPTIONS: type = ContactOptions
+KEYS: tuple[str, ...] = ("object", "environment", "trajectory", "fingers", "cost", "robustness", "options")
+ANSWER_KEYS: tuple[str, ...] = (
+    *plain_keys(Plan),
+    "gap",
+    "modes",
+    "finger_positions",
+    "finger_forces",
+    "contact_forces",
+)
+FORCE_LIMIT = 10
+"""Largest force of a finger over m g, where a file states none."""
 
-METHODS = ("exact", "thesis", "scip")
 
-
-def read(data: dict[str, Any]) -> tuple[ContactTask, dict[str, Any]]:
-    """The task that a file describes and keyword options for the solver.  Raises InvalidProblem."""
-    sections = ("object", "environment", "trajectory", "fingers", "cost", "robustness", "options")
-    file = Section(data, "", ("schema", "problem", "description", *sections))
-    file.text("description", "")
-    body, com = _read_body(file.section("object", ("vertices", "mass", "com", "inertia")))
-    environment = _read_environment(
-        file.section("environment", ("plane", "gravity", "walls", "support_friction"))
-    )
-    trajectory = _read_trajectory(file.section("trajectory", ("dt", "poses", "ends", "before", "after")), com)
+def read(file: Section) -> tuple[ContactTask, dict[str, Any]]:
+    """The task that a file describes and options for the solver.  Raises InvalidProblem."""
+    body, com = read_body(file.section("object", ("vertices", "mass", "com", "inertia")))
+    surroundings = file.section("environment", ("walls", *plain_keys(Environment)))
+    walls = read_walls(surroundings, "walls", (HalfPlane,))
+    environment = Environment(walls=walls, **surroundings.values(Environment))
+    motion = file.section("trajectory", ("dt", "poses", "ends", "before", "after"))
+    fingers = file.section("fingers", plain_keys(Fingers))
+    largest = FORCE_LIMIT * body.mass * environment.gravity
+    cost = file.section("cost", plain_keys(Cost), optional=True)
+    robustness = file.section("robustness", plain_keys(Robustness), optional=True)
     task = ContactTask(
         body=body,
         environment=environment,
-        trajectory=trajectory,
-        fingers=_read_fingers(file, 10 * body.mass * environment.gravity),
-        cost=_read_cost(file),
-        robustness=_read_robustness(file),
+        trajectory=_read_trajectory(motion, com),
+        fingers=Fingers(**fingers.values(Fingers, max_force=largest)),
+        cost=Cost(**cost.values(Cost)),
+        robustness=Robustness(**robustness.values(Robustness)),
     )
-    return task, _read_options(file)
+    return task, file.section("options", plain_keys(OPTIONS), optional=True).values(OPTIONS)
 
 
-def _read_body(section: Section) -> tuple[Body, Array]:
-    """Body about its centre of mass, and the centre of mass in the file's body frame."""
-    listed = section.array("vertices", (None, 2))
-    field = section.path("vertices")
-    if len(listed) and np.ptp(listed, axis=0).max() < SMALLEST:
-        raise InvalidProblem(field, expected=f"an object larger than {SMALLEST:g} m", got="a smaller one")
-    vertices = simple_polygon(listed, field=field)
-    mass = section.number("mass", positive=True)
-    plate = mass_properties(vertices)
-    com = section.array("com", (2,)) if "com" in section else plate.centroid
-    if not shapely.MultiPoint(vertices).convex_hull.buffer(SMALLEST).covers(shapely.Point(com)):
-        raise InvalidProblem(
-            section.path("com"), expected="a point inside the object's hull", got=shorten(com.tolist())
-        )
-    offset = com - plate.centroid
-    uniform = mass * (plate.second_moment / plate.area + float(offset @ offset))
-    inertia = section.number("inertia", positive=False) if "inertia" in section else uniform
-    return Body(vertices=vertices - com, mass=mass, inertia=inertia), com
-
-
-def _read_environment(section: Section) -> Environment:
-    walls = section.sections("walls", ("point", "normal", "friction"))
-    return Environment(
-        plane=section.choice("plane", ("sagittal", "transverse"), "sagittal"),  # type: ignore[arg-type]
-        gravity=section.number("gravity", 9.81, positive=True),
-        walls=tuple(_read_wall(wall) for wall in walls),
-        support_friction=section.number("support_friction", 0.3),
-    )
-
-
-def _read_wall(section: Section) -> HalfPlane:
-    normal = section.array("normal", (2,))
-    length = float(np.linalg.norm(normal))
-    if length < SMALLEST:
-        raise InvalidProblem(
-            section.path("normal"), expected="a direction into free space", got="a zero vector"
-        )
-    return HalfPlane(
-        point=section.array("point", (2,)),
-        normal=normal / length,
-        friction=section.number("friction", 0.0),
-        name=section.name,
-    )
+def write(task: ContactTask) -> dict[str, Any]:
+    """What `read` reads; lengths and poses refer to the task's own body frame, whose origin is the centre of mass."""
+    path, walls = task.trajectory, write_walls(task.environment.walls)
+    return {
+        "object": write_body(task.body),
+        "environment": {**plain_values(task.environment), "walls": walls},
+        "trajectory": {"dt": path.dt} | {k: getattr(path, k).tolist() for k in ("poses", "before", "after")},
+        "fingers": plain_values(task.fingers),
+        "cost": plain_values(task.cost),
+        "robustness": plain_values(task.robustness),
+    }
 
 
 def _read_trajectory(section: Section, com: Array) -> Trajectory:
@@ -97,8 +85,8 @@ def _read_trajectory(section: Section, com: Array) -> Trajectory:
     poses = moved_origin(section.array("poses", (None, 3)), com)
     if len(poses) < 2:
         raise InvalidProblem(section.path("poses"), expected="at least 2 poses", got=f"{len(poses)}")
-    ends = section.choice("ends", ("steady", "rest"), "steady")
-    by_rule = Trajectory.of(poses.tolist(), section.number("dt", positive=True), ends)
+    rule = {"ends": section.text("ends")} if "ends" in section else {}
+    by_rule = Trajectory.of(poses, section.number("dt", positive=True), **rule)
     outside = {
         key: moved_origin(section.array(key, (3,)), com) if key in section else getattr(by_rule, key)
         for key in ("before", "after")
@@ -106,44 +94,72 @@ def _read_trajectory(section: Section, com: Array) -> Trajectory:
     return Trajectory(dt=by_rule.dt, poses=by_rule.poses, **outside)
 
 
-def _read_fingers(file: Section, default_force: float) -> Fingers:
-    section = file.section("fingers", ("count", "friction", "max_force", "facet_margin", "clearance"))
-    return Fingers(
-        count=section.integer("count", least=1),
-        friction=section.number("friction"),
-        max_force=section.number("max_force", default_force),
-        facet_margin=section.number("facet_margin", 0.05),
-        clearance=section.number("clearance", 0.002),
+def answer_fields(problem: Problem, answer: Plan) -> dict[str, Any]:
+    """The plan as plain JSON values, facets and vertices numbered as in the problem file; null where there is none."""
+    numbering = Numbering.of(problem.data)
+    summary = {**plain_values(answer), "gap": jsonable(answer.gap)}
+    if not answer.found:
+        return summary
+    return {
+        **summary,
+        "modes": [[None if f == FREE else f for f in row] for row in numbering.facets(answer.modes).tolist()],
+        "finger_positions": answer.positions.tolist(),
+        "finger_forces": answer.forces.tolist(),
+        "contact_forces": [
+            {
+                "step": c.step,
+                "vertex": numbering.vertex(c.vertex),
+                "wall": None if c.wall == SUPPORT else c.wall,
+                "point": c.point.tolist(),
+                "force": c.force.tolist(),
+            }
+            for c in answer.contact_forces
+        ],
+    }
+
+
+def read_answer(problem: Problem, file: Section) -> Plan:
+    """The plan of a solution file, checked for form (its truth is what `expert.verify` checks).  Raises InvalidProblem."""
+    summary, task, numbering = file.values(Plan), problem.task, Numbering.of(problem.data)
+    if summary["status"] not in ("optimal", "feasible"):
+        return Plan(**summary)
+    shape = (task.steps, task.fingers.count, 2)
+    return Plan(
+        **summary,
+        modes=numbering.facets(_read_modes(file, shape[:2], numbering.count)),
+        positions=file.array("finger_positions", shape),
+        forces=file.array("finger_forces", shape),
+        contact_forces=tuple(
+            _read_contact(section, task, numbering)
+            for section in file.sections("contact_forces", ("step", "vertex", "wall", "point", "force"))
+        ),
     )
 
 
-def _read_cost(file: Section) -> Cost:
-    section = file.section("cost", ("force", "acceleration", "margin"), optional=True)
-    return Cost(
-        force=section.number("force", 1.0),
-        acceleration=section.number("acceleration", 1.0),
-        margin=section.number("margin", 0.0),
-    )
+def _read_modes(file: Section, shape: tuple[int, int], facets: int) -> IntArray:
+    field, rows = file.path("modes"), file.take("modes", "facets by step and finger")
+    if not isinstance(rows, list) or len(rows) != shape[0]:
+        raise InvalidProblem(field, expected=f"a list of {shape[0]} lists", got=shorten(rows))
+    for t, row in enumerate(rows):
+        valid = isinstance(row, list) and len(row) == shape[1]
+        if not valid or not all(f is None or (type(f) is int and 0 <= f < facets) for f in row):
+            what = f"{shape[1]} facets from 0 to {facets - 1}, or null"
+            raise InvalidProblem(f"{field}[{t}]", expected=what, got=shorten(row))
+    return np.array([[FREE if f is None else f for f in row] for row in rows], dtype=np.int64)
 
 
-def _read_robustness(file: Section) -> Robustness:
-    keys = ("cone_fraction", "support_inset", "min_normal_force", "min_interval", "free_clearance")
-    section = file.section("robustness", keys, optional=True)
-    return Robustness(
-        cone_fraction=section.number("cone_fraction", 1.0),
-        support_inset=section.number("support_inset", 0.0),
-        min_normal_force=section.number("min_normal_force", 0.0),
-        min_interval=section.integer("min_interval", 1, least=1),
-        free_clearance=section.number("free_clearance", 0.0),
-    )
+def _read_contact(section: Section, task: ContactTask, numbering: Numbering) -> ContactForce:
+    """One environment force; where no point is given it acts at the vertex."""
+    step = _index(section, "step", task.steps)
+    vertex = numbering.vertex(_index(section, "vertex", numbering.count))
+    wall = _index(section, "wall", len(task.environment.walls)) if "wall" in section else SUPPORT
+    at_vertex = to_world(task.trajectory.poses[step], task.body.vertices)[vertex]
+    point = section.array("point", (2,)) if "point" in section else at_vertex
+    return ContactForce(step=step, vertex=vertex, wall=wall, point=point, force=section.array("force", (2,)))
 
 
-def _read_options(file: Section) -> dict[str, Any]:
-    section = file.section("options", ("gap", "time_limit", "method", "node_limit"), optional=True)
-    gap, time_limit = section.number("gap", 1e-3), section.number("time_limit", 60.0, positive=True)
-    if not 0 <= gap < 1:
-        raise InvalidProblem(section.path("gap"), expected="a fraction in [0, 1)", got=f"{gap:g}")
-    options = {"gap": gap, "time_limit": time_limit, "method": section.choice("method", METHODS, "exact")}
-    return options | (
-        {"node_limit": section.integer("node_limit", least=1)} if "node_limit" in section else {}
-    )
+def _index(section: Section, key: str, count: int) -> int:
+    index = section.integer(key)
+    if index >= count:
+        raise InvalidProblem(section.path(key), expected=f"an index from 0 to {count - 1}", got=f"{index}")
+    return index

@@ -7,24 +7,27 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from itertools import islice
-from typing import Literal
 
 from expert.errors import InvalidProblem
 from expert.geometry.pose import rotation
 from expert.grasping.proposals import Proposal, Search, decomposed, goal_cells, thesis
 from expert.grasping.smooth import acceleration
-from expert.problems.grasp import GraspProblem, GraspSolution
+from expert.problems.grasp import GraspMethod, GraspOptions, GraspProblem, GraspSolution
 from expert.verify.grasp.check import verify_grasp
 from expert.verify.grasp.report import GraspReport
 
-Method = Literal["goal_cell", "decomposed", "miqp1", "miqp2"]
 MOST_CELLS, MOST_CHECKS = 8, 20
 """Goal cells, and proposals of any other kind, that the checker sees."""
 QUICK_CHECK, PATIENT_CHECK = 1.5, 8.0
 """Processor time [s] that the checker may spend on what one proposal can reach, at first and for those still in doubt."""
 
 
-def solve(problem: GraspProblem, *, method: Method = "goal_cell", time_limit: float = 30.0) -> GraspSolution:
+def solve(
+    problem: GraspProblem,
+    *,
+    method: GraspMethod = GraspOptions.method,
+    time_limit: float = GraspOptions.time_limit,
+) -> GraspSolution:
     """A certified grasp, the best by the problem's cost among those that the method proposes (Thesis 5.2.5).
 
     goal_cell: goal cells, and the decomposed search where none of them is confirmed; the answer names what found it.
@@ -96,7 +99,7 @@ def _answer(search: Search, proposal: Proposal) -> GraspSolution:
     )
 
 
-METHODS: dict[str, Callable[[Search], Iterable[Iterator[Proposal]]]] = {
+METHODS: dict[GraspMethod, Callable[[Search], Iterable[Iterator[Proposal]]]] = {
     "goal_cell": lambda search: (
         islice(goal_cells(search), MOST_CELLS),
         islice(decomposed(search), MOST_CHECKS),

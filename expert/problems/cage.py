@@ -14,9 +14,9 @@ import shapely
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import signed_distance
 from expert.geometry.pose import Array, to_body
-from expert.world.fingers import Gripper
+from expert.world.fingers import Gripper, require_grippers
 from expert.world.shape import Shape
-from expert.world.values import readonly, require
+from expert.world.values import readonly, require, require_time
 from expert.world.walls import Segment, segment_ends
 
 START_TOLERANCE = 1e-7
@@ -120,9 +120,7 @@ class CageProblem:
         require(total >= 2, "fingers", "at least 2 fingers, fixed ones included", total)
         alone = not (self.fewest and self.grippers)
         require(alone, "fingers.fewest", "false with grippers, which name their fingers", "true")
-        for gripper in self.grippers:
-            known = max(gripper.fingers) < self.count
-            require(known, "fingers.grippers", f"indices from 0 to {self.count - 1}", list(gripper.fingers))
+        require_grippers(self.grippers, self.count)
 
     def _require_ranges(self) -> None:
         require(0 < self.margin < 0.1, "options.margin", "a fraction between 0 and 0.1", self.margin)
@@ -148,6 +146,25 @@ class CageProblem:
             fingers=np.concatenate([np.reshape(fingers, (-1, 2)), self.fixed]),
             walls=self.walls,
         )
+
+
+CageMethod = Literal["swept", "model", "thesis"]
+CageSolver = Literal["highs", "scip"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CageOptions:
+    """How to search, with which solver, for how long [s].
+
+    swept: the model, and immobilising grasps where it is slow; model: the model alone; thesis: MIP1.
+    """
+
+    method: CageMethod = "swept"
+    solver: CageSolver = "highs"
+    time_limit: float = 60.0
+
+    def __post_init__(self) -> None:
+        require_time(self.time_limit)
 
 
 CageStatus = Literal["caged", "none_found", "time_limit"]

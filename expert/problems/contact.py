@@ -10,7 +10,7 @@ from expert.world.environment import Environment
 from expert.world.fingers import Fingers
 from expert.world.motion import Trajectory
 from expert.world.shape import Body
-from expert.world.values import IntArray, require
+from expert.world.values import IntArray, require, require_time
 
 FREE = -1
 """Mode of a finger that touches no facet."""
@@ -106,6 +106,30 @@ class ContactTask:
     def contact_tolerance(self) -> float:
         """Gaps and slips below this count as zero [m]."""
         return 1e-5 * self.body.size
+
+
+ContactMethod = Literal["exact", "thesis", "scip"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactOptions:
+    """How to solve: branch and bound over contact modes, MIQP1 of the thesis, or SCIP on the exact bilinear model.
+
+    gap: relative optimality gap at which the search may stop.  time_limit [s].  node_limit: a budget that does not depend on
+    the machine's load, of the exact method.
+    """
+
+    gap: float = 1e-3
+    time_limit: float = 60.0
+    method: ContactMethod = "exact"
+    node_limit: int | None = None
+
+    def __post_init__(self) -> None:
+        require(0 <= self.gap < 1, "options.gap", "a fraction in [0, 1)", self.gap)
+        require_time(self.time_limit)
+        require(
+            self.node_limit is None or self.node_limit >= 1, "options.node_limit", ">= 1", self.node_limit
+        )
 
 
 Status = Literal["optimal", "feasible", "infeasible", "time_limit"]

@@ -10,12 +10,31 @@ import numpy as np
 
 from expert.geometry.pose import Array
 from expert.problems.cage import Arrangement
-from expert.world.fingers import Gripper
+from expert.world.fingers import Gripper, require_grippers
 from expert.world.shape import Shape
-from expert.world.values import readonly, require
+from expert.world.values import readonly, require, require_time
 
 GraspStatus = Literal["certified", "uncertified", "none_found", "time_limit"]
 GraspCost = Literal["attraction", "acceleration"]
+GraspMethod = Literal["goal_cell", "decomposed", "miqp1", "miqp2"]
+LAST_RANGE = 0.5
+"""Half-range [deg] at the last knot of a schedule."""
+
+
+def schedule(first: float = 15.0) -> Array:
+    """The usual half-ranges [deg] for the largest of them: equal steps down to a quarter, then LAST_RANGE."""
+    return np.array([first, 0.75 * first, 0.5 * first, 0.25 * first, LAST_RANGE])
+
+
+@dataclass(frozen=True, kw_only=True)
+class GraspOptions:
+    """How to search: goal cells (and where they fail the decomposed search), or the thesis's MIQP1, MIQP2; time_limit [s]."""
+
+    method: GraspMethod = "goal_cell"
+    time_limit: float = 60.0
+
+    def __post_init__(self) -> None:
+        require_time(self.time_limit)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +51,7 @@ class GraspProblem:
     shape: Shape
     pose: Array
     count: int = 4
-    half_ranges: Array = field(default_factory=lambda: np.radians([15, 11.25, 7.5, 3.75, 0.5]))
+    half_ranges: Array = field(default_factory=lambda: np.radians(schedule()))
     cost: GraspCost = "attraction"
     grippers: tuple[Gripper, ...] = ()
     parallel: bool = False
@@ -49,9 +68,7 @@ class GraspProblem:
         require(inside, "options.half_ranges", what, np.degrees(ranges).round(3).tolist())
         require(0 < self.margin < 0.1, "options.margin", "a fraction between 0 and 0.1", self.margin)
         require(self.cost in ("attraction", "acceleration"), "cost", "attraction or acceleration", self.cost)
-        for gripper in self.grippers:
-            known = max(gripper.fingers) < self.count
-            require(known, "fingers.grippers", f"indices from 0 to {self.count - 1}", list(gripper.fingers))
+        require_grippers(self.grippers, self.count)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,5 +1,6 @@
 """Point fingers and what holds them."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,3 +48,10 @@ class Gripper:
         require(i != j and min(i, j) >= 0, "grippers.fingers", "two different indices", list(self.fingers))
         least, most = self.opening
         require(0 <= least <= most < np.inf, "grippers.opening", "0 <= least <= most", [least, most])
+
+
+def require_grippers(grippers: Iterable[Gripper], count: int) -> None:
+    """Raise InvalidProblem for a gripper that names a finger beyond the first `count`."""
+    for gripper in grippers:
+        known = max(gripper.fingers) < count
+        require(known, "fingers.grippers", f"indices from 0 to {count - 1}", list(gripper.fingers))

@@ -106,14 +106,18 @@ class Body(Shape):
             require(0 < value < np.inf, f"object.{name}", "a positive number", value)
 
     @classmethod
-    def uniform(cls, vertices: object, mass: float) -> tuple["Body", Array]:
-        """Body of uniform density and its centroid (2,) in the frame of the given vertices."""
+    def uniform(cls, vertices: object, mass: float, com: Array | None = None) -> tuple["Body", Array]:
+        """Body of uniform density and its centroid (2,) in the frame of the given vertices.
+
+        Where another centre of mass com (2,) is stated, the inertia is the uniform plate's about it.
+        """
         v = simple_polygon(vertices, field="object.vertices")
         plate = mass_properties(v)
         require(0 < mass < np.inf, "object.mass", "a positive number", mass)
-        return cls(
-            vertices=v - plate.centroid, mass=mass, inertia=mass * plate.second_moment / plate.area
-        ), plate.centroid
+        centre = plate.centroid if com is None else com
+        offset = centre - plate.centroid
+        inertia = mass * (plate.second_moment / plate.area + float(offset @ offset))
+        return cls(vertices=v - centre, mass=mass, inertia=inertia), centre
 
 
 def _convex_piece(vertices: object, k: int) -> Array:

@@ -30,3 +30,8 @@ def require(ok: bool, field: str, expected: str, got: object, remedy: str = "") 
     """Raise InvalidProblem unless `ok`; a comparison with nan is not ok."""
     if not ok:
         raise InvalidProblem(field, expected=expected, got=f"{got}", remedy=remedy)
+
+
+def require_time(limit: float) -> None:
+    """Raise InvalidProblem unless the limit is a positive number of seconds."""
+    require(0 < limit < np.inf, "options.time_limit", "a positive number of seconds", limit)

@@ -1,4 +1,4 @@
-"""Walls: half-planes, whose other side is solid, and segments, which bound the object from both sides."""
+"""Walls: half-planes and polygons, which are solid, and segments, which bound the object from both sides."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from expert.geometry.polygon import signed_distance, simple_polygon
 from expert.geometry.pose import Array
 from expert.world.values import readonly, require
 
@@ -30,7 +31,7 @@ class HalfPlane:
             f"length {length:.3g}",
             "divide it by its length",
         )
-        require(0 <= self.friction < np.inf, f"{self.name}.friction", "a number >= 0", self.friction)
+        _require_friction(self)
 
     def gap(self, points: Array) -> Array:
         """Signed distance of points (..., 2) from the wall [m], negative inside."""
@@ -42,15 +43,40 @@ class Segment:
     """Wall without thickness between two ends (2, 2) [m], world frame."""
 
     ends: Array
+    friction: float = 0.0
     name: str = "wall"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ends", readonly(self.ends, (2, 2), self.name))
         apart = bool((self.ends[0] != self.ends[1]).any())
         require(apart, self.name, "two different ends", "a point")
+        _require_friction(self)
 
 
-Wall = HalfPlane | Segment
+@dataclass(frozen=True, kw_only=True)
+class Obstacle:
+    """Wall: a simple polygon (V, 2) [m], counter-clockwise, world frame, solid inside."""
+
+    vertices: Array
+    friction: float = 0.0
+    name: str = "wall"
+
+    def __post_init__(self) -> None:
+        vertices = simple_polygon(self.vertices, field=f"{self.name}.vertices")
+        vertices.setflags(write=False)
+        object.__setattr__(self, "vertices", vertices)
+        _require_friction(self)
+
+    def gap(self, points: Array) -> Array:
+        """Signed distance of points (..., 2) from the outline [m], negative inside."""
+        return signed_distance(self.vertices, np.asarray(points, dtype=float))
+
+
+Wall = HalfPlane | Segment | Obstacle
+
+
+def _require_friction(wall: Wall) -> None:
+    require(0 <= wall.friction < np.inf, f"{wall.name}.friction", "a number >= 0", wall.friction)
 
 
 def segments(ends: ArrayLike) -> tuple[Segment, ...]:

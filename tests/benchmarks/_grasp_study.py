@@ -13,11 +13,10 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from expert.files.certified_grasp import schedule
 from expert.geometry.pose import Array, to_world
 from expert.grasping.sweeping import sweep
 from expert.grasping.synthesis import solve
-from expert.problems.grasp import GraspProblem, GraspSolution
+from expert.problems.grasp import GraspProblem, GraspSolution, schedule
 from expert.verify.grasp.check import verify_grasp
 from expert.verify.grasp.report import GraspReport
 from expert.world.named import named_shape

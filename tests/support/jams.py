@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from expert.files.certified_grasp import schedule
 from expert.geometry.pose import Array
-from expert.problems.grasp import GraspProblem
+from expert.problems.grasp import GraspProblem, schedule
 from tests.support.grasps import WIDE, problem_of, shrinking_case
 from tests.support.polygons import irregular_polygon
 

@@ -1,8 +1,15 @@
-"""Strict reading of nested mappings: every value is checked where it is taken, and every refusal names its field."""
+"""Strict reading of nested mappings: every value is checked where it is taken, and every refusal names its field.
 
+Numbers, flags and words of a noun stand in files under the names of its dataclass fields, with the same defaults: stated there,
+once.
+"""
+
+import dataclasses
 import difflib
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
+from types import NoneType
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -57,10 +64,8 @@ class Section:
             raise InvalidProblem(self.path(key), expected=what, got="nothing", remedy="add the field")
         return self.data[key]
 
-    def number(self, key: str, default: float | None = None, *, positive: bool = False) -> float:
+    def number(self, key: str, *, positive: bool = False) -> float:
         """A finite number of sane magnitude; `positive` ones are at least SMALLEST."""
-        if default is not None and key not in self:
-            return default
         value = checked_number(self.take(key, "a number"), self.path(key))
         if positive and not value >= SMALLEST:
             raise InvalidProblem(
@@ -68,28 +73,22 @@ class Section:
             )
         return value
 
-    def integer(self, key: str, default: int | None = None, *, least: int = 0) -> int:
+    def integer(self, key: str, *, least: int = 0) -> int:
         """A whole number >= least."""
-        if default is not None and key not in self:
-            return default
         value = self.take(key, "a whole number")
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= LARGEST:
             raise InvalidProblem(self.path(key), expected=f"a whole number >= {least}", got=shorten(value))
         return value
 
-    def text(self, key: str, default: str | None = None) -> str:
+    def text(self, key: str) -> str:
         """A string."""
-        if default is not None and key not in self:
-            return default
         value = self.take(key, "a text")
         if not isinstance(value, str):
             raise InvalidProblem(self.path(key), expected="a text", got=shorten(value), remedy="quote it")
         return value
 
-    def choice(self, key: str, choices: Collection[str], default: str | None = None) -> str:
+    def choice(self, key: str, choices: Collection[str]) -> str:
         """One of the given words."""
-        if default is not None and key not in self:
-            return default
         value = self.take(key, " or ".join(choices))
         if not isinstance(value, str) or value not in choices:
             raise InvalidProblem(self.path(key), expected=" or ".join(choices), got=shorten(value))
@@ -99,6 +98,32 @@ class Section:
         """Nested lists of numbers of the given shape; None: any length.  An empty list is allowed where the length is free."""
         what = f"lists of numbers of shape ({', '.join('n' if n is None else str(n) for n in shape)})"
         return checked_array(self.take(key, what), shape, self.path(key))
+
+    def flag(self, key: str) -> bool:
+        """true or false."""
+        value = self.take(key, "true or false")
+        if not isinstance(value, bool):
+            raise InvalidProblem(self.path(key), expected="true or false", got=shorten(value))
+        return value
+
+    def values(self, noun: type, keys: Collection[str] | None = None, **defaults: Any) -> dict[str, Any]:
+        """Numbers, flags and words for a dataclass, by default all that it has; those that are missing keep its defaults."""
+        hints, read = get_type_hints(noun), {}
+        for field in dataclasses.fields(noun):
+            if field.name not in (plain_keys(noun) if keys is None else keys):
+                continue
+            if field.name in self or (field.default is dataclasses.MISSING and field.name not in defaults):
+                read[field.name] = self._value(field.name, hints[field.name])
+        return {**defaults, **read}
+
+    def _value(self, key: str, hint: Any) -> object:
+        hint = _without_none(hint)
+        if get_origin(hint) is Literal:
+            return self.choice(key, get_args(hint))
+        readers: dict[Any, Callable[[str], object]] = {
+            bool: self.flag, int: self.integer, float: self.number, str: self.text
+        }  # fmt: skip
+        return readers[hint](key)
 
     def section(self, key: str, keys: Collection[str], *, optional: bool = False) -> "Section":
         """A nested mapping; an optional one that is missing reads as empty."""
@@ -112,6 +137,34 @@ class Section:
         if value is not None and not isinstance(value, list):
             raise InvalidProblem(self.path(key), expected="a list of mappings", got=shorten(value))
         return (Section(item, f"{self.path(key)}[{i}]", keys) for i, item in enumerate(value or []))
+
+
+def plain_keys(noun: type) -> tuple[str, ...]:
+    """Fields of a dataclass that are numbers, flags or words, so that files hold them as they are."""
+    hints = {key: _without_none(hint) for key, hint in get_type_hints(noun).items()}
+    plain = {
+        key for key, hint in hints.items() if hint in (bool, int, float, str) or get_origin(hint) is Literal
+    }
+    return tuple(field.name for field in dataclasses.fields(noun) if field.name in plain)
+
+
+def plain_values(noun: Any, keys: Collection[str] | None = None) -> dict[str, Any]:
+    """Those fields of a dataclass instance as JSON values; numbers that are not finite, which JSON does not know, as null."""
+    read = {key: getattr(noun, key) for key in (plain_keys(type(noun)) if keys is None else keys)}
+    return {key: jsonable(value) for key, value in read.items()}
+
+
+def jsonable(value: Any) -> Any:
+    """A number, flag, word or None for a file: None where it is nan or infinite."""
+    if isinstance(value, bool | str | NoneType | int):
+        return value
+    return float(value) if math.isfinite(value) else None
+
+
+def _without_none(hint: Any) -> Any:
+    """T of the hint T | None."""
+    parts = [part for part in get_args(hint) if part is not NoneType]
+    return parts[0] if NoneType in get_args(hint) and len(parts) == 1 else hint
 
 
 def checked_number(value: object, field: str) -> float:
