@@ -69,9 +69,10 @@ figures: setup
 		$(BIN)/python -m expert verify build/$$name.json || exit 1; \
 		for ending in png gif; do $(BIN)/python -m expert draw build/$$name.json -o docs/gallery/grasp_$$name.$$ending || exit 1; done; \
 	done
-	@for name in 28_random 29_overlays 30_attraction 31_force_closure; do echo "== figure 5-$$name"; \
-		$(BIN)/python -m expert.drawing.grasp_figures 5-$${name%%_*} -o docs/gallery/grasp_$${name#*_}.png || exit 1; \
+	@for name in 28_random 29_overlays 30_attraction; do echo "== figure 5-$$name"; \
+		$(BIN)/python examples/grasp_figures.py 5-$${name%%_*} -o docs/gallery/grasp_$${name#*_}.png || exit 1; \
 	done
+	$(BIN)/python examples/against_force_closure.py -o docs/gallery/grasp_force_closure.png
 
 clean:
 	find expert datasets dlm tests -name __pycache__ -prune -exec rm -rf {} +

@@ -9,12 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from expert.drawing.certified_grasp import draw
-from expert.grasping.sweeping import sweep
+from expert.grasping.executions import executions
 from expert.grasping.synthesis import solve
 from expert.problems.grasp import GraspProblem
 from expert.verify.grasp.check import verify
-from expert.verify.grasp.finger_path import FingerPath
-from expert.verify.grasp.start_set import StartSet
 from expert.world.shape import Shape
 
 parser = argparse.ArgumentParser(description=__doc__)
@@ -28,8 +26,7 @@ grasp = solve(problem, time_limit=60)
 print(f"{grasp.status} by {grasp.method} after {grasp.seconds:.2f} s")
 print(verify(problem, grasp))
 
-starts = StartSet(FingerPath(wedge, problem.pose, grasp.path)).starts(np.random.default_rng(0), 100)
-runs = sweep(wedge, grasp.path, starts, goal=problem.pose)
-print(f"{int(runs.arrived(problem.pose, wedge.size).sum())} of {len(starts)} executions end at the goal")
+runs = executions(problem, grasp, 100)
+print(f"{int(runs.arrived(problem.pose, wedge.size).sum())} of 100 executions end at the goal")
 draw(problem, grasp, output)
 print(f"picture in {output}")

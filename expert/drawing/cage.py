@@ -52,7 +52,7 @@ def draw(
         if name == "workspace":
             draw_workspace(figure.add_subplot(*place), task, arrangement, report)
         elif name == "slice":
-            draw_slice(figure.add_subplot(*place), arrangement, answer)
+            draw_slice(figure.add_subplot(*place), arrangement)
         else:
             draw_component(figure.add_subplot(*place, projection="3d"), arrangement, report)
     save_figure(figure, path, colours=128)

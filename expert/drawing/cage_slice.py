@@ -1,4 +1,4 @@
-"""A slice of configuration space: what each obstacle forbids, what is free about the start, and the loop around it."""
+"""A slice of configuration space: what each obstacle forbids, what is free about the start, and a loop around it."""
 
 import numpy as np
 import shapely
@@ -6,58 +6,51 @@ from matplotlib.axes import Axes
 
 from expert.drawing.cage_workspace import finger_colour
 from expert.drawing.canvas import EDGE, WALL, framed_axes, scale_bar
-from expert.geometry.pose import Array, rotation
-from expert.loops.swept import SweptGeometry
-from expert.problems.cage import Arrangement, CageSolution
-from expert.world.frame import Frame
+from expert.geometry.pose import Array
+from expert.problems.cage import Arrangement
 from expert.world.slices import free_components, obstacles_at
 
 FREE, ELSEWHERE, START, LOOP = "#2b7fd0", "#d3e6f7", "#111111", "#111111"
 SMALL = 0.1
 """A free component below this share of the picture is shown once more, enlarged."""
+HALVINGS, MIDDLE = 12, 0.7
+"""Of the search for how far from the free component obstacles close around it; the loop is drawn at this share of it."""
 
 
-def draw_slice(axes: Axes, arrangement: Arrangement, answer: CageSolution | None) -> None:
+def draw_slice(axes: Axes, arrangement: Arrangement) -> None:
     """Positions of the reference point at the start orientation: obstacles in their fingers' colours, the bounded free component.
 
-    Dashed: the loop of obstacles that the model found, where it names one.
+    Dashed: a closed curve within the obstacles around the start, where there is one (Thesis Fig. 5-16).
     """
     angle = float(arrangement.pose[2])
     obstacles = obstacles_at(arrangement.shape, arrangement.fingers, arrangement.wall_ends, angle)
     free = free_components(arrangement.shape, arrangement.fingers, arrangement.wall_ends, angle)
     _draw_obstacles(axes, arrangement, obstacles)
     _draw_free(axes, arrangement, free)
-    if answer is not None and answer.topology:
-        loop = enclosing_loop(arrangement, answer)
+    start = shapely.Point(arrangement.pose[:2]).buffer(1e-3 * arrangement.shape.size)
+    around = [p for p in free if p.intersects(start)]
+    for component in around:
+        loop = enclosing_loop(component, obstacles)
         axes.plot(*loop.T, color=LOOP, lw=1.3, ls=(0, (3, 2)), zorder=5)
     corners = shapely.get_coordinates(obstacles)
     framed_axes(axes, corners, 0.04)
     scale_bar(axes)
     axes.set_title(f"slice at θ = {np.degrees(angle):.0f}°", fontsize=10)
-    start = shapely.Point(arrangement.pose[:2]).buffer(1e-3 * arrangement.shape.size)
-    around = [p for p in free if p.intersects(start)]
     if around:
         reach = np.abs(shapely.get_coordinates(around) - arrangement.pose[:2]).max()
         if reach < SMALL * np.ptp(corners, axis=0).max():
             _enlarge(axes, arrangement, obstacles, free, 1.5 * float(reach))
 
 
-def enclosing_loop(arrangement: Arrangement, answer: CageSolution) -> Array:
-    """Closed polyline (k, 2) [m] through the obstacles of the model's loop: points where pieces meet (Thesis Fig. 5-16)."""
-    frame = Frame.of(arrangement.shape, arrangement.pose)
-    geometry = SweptGeometry(frame.body(arrangement.shape.vertices), 0.0)
-    pieces = [frame.radius * piece + frame.centre for piece in geometry.pieces]
-    turn = rotation(float(arrangement.pose[2]))
-
-    def obstacle(finger: int, piece: int) -> shapely.Polygon:
-        return shapely.Polygon(arrangement.fingers[finger] - pieces[piece] @ turn.T)
-
-    points = []
-    for before, after in zip((answer.topology[-1], *answer.topology[:-1]), answer.topology, strict=True):
-        entry, exit_ = obstacle(after.element, before.next_piece), obstacle(after.element, after.piece)
-        following = obstacle(after.next_element, after.next_piece)
-        points += [entry.intersection(exit_).centroid, exit_.intersection(following).centroid]
-    return shapely.get_coordinates([*points, points[0]])
+def enclosing_loop(component: shapely.Polygon, obstacles: list[shapely.Polygon]) -> Array:
+    """Closed curve (k, 2) [m] within the obstacles around a bounded free component, as far from it as they are thick."""
+    solid = shapely.union_all(obstacles)
+    low, high = 0.0, float(np.ptp(shapely.get_coordinates(obstacles), axis=0).max())
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        ring = component.buffer(middle).exterior
+        low, high = (middle, high) if solid.covers(ring) else (low, middle)
+    return np.array(component.buffer(MIDDLE * low).exterior.coords)
 
 
 def _draw_obstacles(axes: Axes, arrangement: Arrangement, obstacles: list[shapely.Polygon]) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.axes import Axes
 
-from expert.drawing.canvas import EDGE, OBJECT, WALL, framed_axes, scale_bar
+from expert.drawing.canvas import EDGE, OBJECT, WALL, closed, framed_axes, scale_bar
 from expert.geometry.pose import Array, cross, to_world
 from expert.problems.cage import Arrangement, CageProblem
 from expert.verify.cage.report import CageReport
@@ -51,7 +51,7 @@ def _draw_escape(axes: Axes, arrangement: Arrangement, path: Array) -> None:
     for share in np.linspace(0, 0.6, 6)[1:]:
         at = share * passed[-1]
         pose = np.array([np.interp(at, passed, column) for column in path.T])
-        outline = _closed(to_world(pose, arrangement.shape.vertices))
+        outline = closed(to_world(pose, arrangement.shape.vertices))
         axes.plot(*outline.T, color=PATH, lw=0.9, alpha=0.75 - share, zorder=1)
 
 
@@ -60,7 +60,7 @@ def draw_object(axes: Axes, arrangement: Arrangement, pose: Array) -> None:
     for piece in arrangement.shape.pieces:
         axes.fill(*to_world(pose, piece).T, color=OBJECT, ec="#c6bdae", lw=0.6, zorder=2)
     outline = to_world(pose, arrangement.shape.vertices)
-    axes.plot(*_closed(outline).T, color=EDGE, lw=1.2, zorder=3)
+    axes.plot(*closed(outline).T, color=EDGE, lw=1.2, zorder=3)
     for wall in arrangement.wall_ends:
         _draw_wall(axes, wall, outline)
     for k, finger in enumerate(arrangement.fingers):
@@ -85,7 +85,3 @@ def _draw_tripod(axes: Axes, fingers: Array) -> None:
     centre = fingers[0] - [0, opening]
     for finger in fingers[:3]:
         axes.plot(*np.stack([centre, finger]).T, color=EDGE, lw=1.2, ls=(0, (4, 2)), zorder=4)
-
-
-def _closed(points: Array) -> Array:
-    return np.concatenate([points, points[:1]])

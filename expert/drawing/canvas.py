@@ -145,11 +145,23 @@ def plain_axes(axes: Axes, low: Array, high: Array) -> None:
         spine.set_color("#cccccc")
 
 
+def square_axes(axes: Axes) -> None:
+    """Make a panel's view a square about its middle, so that all panels are of one size."""
+    low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
+    middle, half = 0.5 * (low + high), 0.5 * (high - low).max()
+    plain_axes(axes, middle - half, middle + half)
+
+
 def framed_axes(axes: Axes, points: Array, margin: float = 0.06) -> None:
     """Equal scales around points (k, 2), with a margin relative to their extent."""
     low, high = points.min(axis=0), points.max(axis=0)
     pad = margin * float((high - low).max())
     plain_axes(axes, low - pad, high + pad)
+
+
+def closed(points: Array) -> Array:
+    """Corners (k, 2) of a polygon with the first one repeated."""
+    return np.concatenate([points, points[:1]])
 
 
 def scale_bar(axes: Axes) -> None:

@@ -24,10 +24,9 @@ from expert.drawing.canvas import (
 )
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, to_world
-from expert.grasping.sweeping import Sweep, sweep
+from expert.grasping.executions import executions
+from expert.grasping.sweeping import Sweep
 from expert.problems.grasp import GraspProblem, GraspSolution, arrangement_at
-from expert.verify.grasp.finger_path import FingerPath
-from expert.verify.grasp.start_set import StartSet
 from expert.world.slices import free_components, obstacles_at
 
 START, GOAL, PATH = "#8d8678", "#7a3db8", "#1f5fbf"
@@ -49,17 +48,6 @@ def draw(task: GraspProblem, answer: GraspSolution | None, path: str | os.PathLi
         save_frames(_frames(task, answer, runs), path, rate=RATE)
     else:
         save_figure(grasp_figure(task, answer, runs), path)
-
-
-def executions(task: GraspProblem, answer: GraspSolution, count: int) -> Sweep:
-    """Executions from random starts in the goal's cage at the first knot, the same ones each time."""
-    cage = StartSet(FingerPath(task.shape, task.pose, answer.path))
-    if not cage.bounded:
-        raise InvalidProblem(
-            "path", expected="fingers that cage the goal at the first knot", got="others", remedy="verify it"
-        )
-    starts = cage.starts(np.random.default_rng(0), count)
-    return sweep(task.shape, answer.path, starts, goal=task.pose)
 
 
 def grasp_figure(task: GraspProblem, answer: GraspSolution, runs: Sweep) -> Figure:

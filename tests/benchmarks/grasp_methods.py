@@ -16,15 +16,13 @@ import time
 import numpy as np
 
 from dlm.simulator.grasp import replay_grasp, replay_grasp_in_mujoco
-from expert.drawing.grasp_figures import force_closure_comparison, start_area
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import mass_properties
 from expert.geometry.pose import Array
+from expert.grasping.executions import force_closure_comparison, start_set
 from expert.grasping.sweeping import sweep
 from expert.grasping.synthesis import solve
 from expert.problems.grasp import GraspProblem, GraspSolution
-from expert.verify.grasp.finger_path import FingerPath
-from expert.verify.grasp.start_set import StartSet
 from tests.benchmarks._grasp_study import (
     TIME_LIMIT,
     Bars,
@@ -56,7 +54,7 @@ def methods(study: Study) -> tuple[list[Row], Bars]:
             problem = task(vertices, cost=cost)
             began = time.process_time()
             answer = solve(problem, method=method, time_limit=TIME_LIMIT)
-            row[method] = start_area(problem, answer) / whole if len(answer.path) else 0.0
+            row[method] = start_set(problem, answer).area / whole if len(answer.path) else 0.0
             row[f"{method}_status"] = answer.status
             row[f"{method}_seconds"] = time.process_time() - began
         rows.append(row)
@@ -71,7 +69,7 @@ def sensitivity(study: Study) -> tuple[list[Row], Bars]:
     """End poses of certified grasps with misplaced fingers, finger friction, and in other simulators."""
     rows = []
     for name, problem, answer in study.certified():
-        starts = StartSet(FingerPath(problem.shape, problem.pose, answer.path))
+        starts = start_set(problem, answer)
         chosen = starts.starts(np.random.default_rng(1), 5 if study.quick else 20)
         row: Row = {"object": name}
         for share in PLACEMENT:
@@ -132,7 +130,7 @@ def three_fingers(study: Study) -> tuple[list[Row], Bars]:
         answer = solve(problem, time_limit=TIME_LIMIT)
         row: Row = {"object": name, "status": answer.status, "seconds": time.process_time() - began}
         if len(answer.path):
-            row["area"] = start_area(problem, answer) / mass_properties(vertices).area
+            row["area"] = start_set(problem, answer).area / mass_properties(vertices).area
             row["verdict"] = moved_report(problem, answer).verdict
             row |= _arrivals(problem, answer, 100 if study.quick else 500)
         rows.append(row | {"reason": answer.reason})
@@ -144,7 +142,7 @@ def three_fingers(study: Study) -> tuple[list[Row], Bars]:
 
 
 def _arrivals(problem: GraspProblem, answer: GraspSolution, count: int) -> Row:
-    starts = StartSet(FingerPath(problem.shape, problem.pose, answer.path))
+    starts = start_set(problem, answer)
     runs = arrivals(problem, answer.path, starts.starts(np.random.default_rng(0), count))
     worst = {"worst_distance": runs.worst_distance, "worst_angle_deg": runs.worst_angle}
     return {"arrived": float(runs.arrived.mean()), **worst}

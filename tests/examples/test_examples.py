@@ -23,6 +23,8 @@ RUNS = [
     pytest.param("plan_from_a_video.py", "clip", [], ["planned", r"ends 0\.\d+ mm and 0\.\d+ deg"], marks=SLOW),
     pytest.param("train_a_stage.py", "trained", ["--iterations", "3"], ["after 3 iterations", "trained: object-trajectory loss"], marks=SLOW),
     pytest.param("figures.py", "pictures", ["3-6", "5-16"], ["Fig. 3-6", "objective", "caged"], marks=SLOW),
+    pytest.param("grasp_figures.py", "starts.png", ["5-30"], [r"t: certified by goal_cell", "hourglass_miqp2: "], marks=SLOW),
+    pytest.param("against_force_closure.py", "ends.png", [], ["certified by goal_cell", "force closure: median error"], marks=SLOW),
     pytest.param("table_4_1.py", "table", ["--small"], [r"\| DLM \|", "report: "], marks=SLOW),
 ]  # fmt: skip
 """Script, its output, further arguments, and patterns that it prints."""

@@ -6,19 +6,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from PIL import Image
 
 from expert.__main__ import main
-from expert.caging.synthesis import solve
 from expert.drawing.cage import draw
 from expert.drawing.cage_component import linked_slices
 from expert.drawing.cage_slice import enclosing_loop
 from expert.errors import InvalidProblem
 from expert.files import read_problem
-from expert.problems.cage import Arrangement, CageProblem
+from expert.geometry.polygon import facet_frames, facets
+from expert.geometry.pose import to_world
+from expert.problems.cage import Arrangement
 from expert.world.named import named_shape
 from expert.world.shape import Shape
-from expert.world.slices import obstacles_at
+from expert.world.slices import free_components, obstacles_at
 from tests.support.polygons import random_polygon
 
 PROBLEMS = Path("configs/problem/cage")
@@ -83,18 +86,26 @@ def test_an_unknown_view_is_refused(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert not picture.exists()
 
 
-def test_the_drawn_loop_stays_in_obstacles_and_winds_once_around_the_start() -> None:
-    shape = Shape(vertices=random_polygon(np.random.default_rng(0), 4))
-    task = CageProblem(shape=shape, pose=np.array([0.1, 0.0, 0.5]), count=4)
-    answer = solve(task, time_limit=60, method="model")
-    assert answer.found
-    arrangement = task.arrangement(answer.fingers)
-    loop = enclosing_loop(arrangement, answer)
-    forbidden = shapely.union_all(
-        obstacles_at(arrangement.shape, arrangement.fingers, arrangement.wall_ends, 0.5)
-    ).buffer(1e-9)
-    assert forbidden.covers(shapely.LineString(loop))
-    angles = np.unwrap(np.arctan2(*(loop - arrangement.pose[:2]).T[::-1]))
+@given(st.integers(0, 10**6), st.floats(-3, 3))
+@settings(max_examples=20, deadline=None, derandomize=True)
+def test_the_drawn_loop_stays_in_obstacles_and_winds_once_around_the_start(seed: int, angle: float) -> None:
+    """Fingers close to the facets of a polygon leave it little room at its orientation."""
+    shape = Shape(vertices=random_polygon(np.random.default_rng(seed), 5))
+    a, b = facets(shape.vertices)
+    inward, _ = facet_frames(shape.vertices)
+    beside = (a + b) / 2 - 0.01 * shape.size * inward
+    pose = np.array([0.1, 0.0, angle])
+    cage = Arrangement(shape=shape, pose=pose, fingers=to_world(pose, beside))
+    obstacles = obstacles_at(cage.shape, cage.fingers, cage.wall_ends, angle)
+    (component,) = (
+        p
+        for p in free_components(cage.shape, cage.fingers, cage.wall_ends, angle)
+        if p.covers(shapely.Point(0.1, 0))
+    )
+    loop = enclosing_loop(component, obstacles)
+    assert shapely.union_all(obstacles).buffer(1e-9).covers(shapely.LineString(loop))
+    assert shapely.Polygon(loop).area > 1.05 * component.area
+    angles = np.unwrap(np.arctan2(*(loop - pose[:2]).T[::-1]))
     assert abs(angles[-1] - angles[0]) == pytest.approx(2 * np.pi)
 
 
