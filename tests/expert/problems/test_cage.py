@@ -7,12 +7,10 @@ import pytest
 
 from expert.errors import InvalidProblem
 from expert.files import problem_of
-from expert.geometry.polygon import signed_area
 from expert.problems.cage import Arrangement, CageProblem
 from expert.world.fingers import Gripper
-from expert.world.named import named_shape
 from expert.world.shape import Shape
-from tests.support.polygons import CAGED, random_nonconvex_polygon, random_polygon
+from tests.support.polygons import random_nonconvex_polygon, random_polygon
 
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
 LEFT, RIGHT = [[0, 0], [1, 0], [1, 1], [0, 1]], [[1, 0], [2, 0], [2, 1], [1, 1]]
@@ -106,12 +104,6 @@ def test_files_of_both_forms_are_read() -> None:
     assert np.degrees(sought.rotation) == pytest.approx(np.array([[15, 15], [5, 20]]))
 
 
-def test_pieces_become_their_union() -> None:
-    shape = Shape.of_pieces([LEFT, RIGHT, [[0.5, 0.2], [1.5, 0.2], [1, 0.8]]])
-    assert signed_area(shape.vertices) == pytest.approx(2)
-    assert len(shape.vertices) == 4
-
-
 def test_touching_fingers_are_accepted() -> None:
     a = Arrangement(
         shape=Shape(vertices=np.array(SQUARE)), pose=np.zeros(3), fingers=np.array([[0, 0.5], [1.0, 0.5]])
@@ -127,13 +119,6 @@ def test_a_gripper_must_name_searched_fingers() -> None:
             count=2,
             grippers=(Gripper(fingers=(0, 5), opening=(0, 1)),),
         )
-
-
-@pytest.mark.parametrize("name", CAGED)
-def test_named_shapes_are_simple_polygons_of_ten_centimetres(name: str) -> None:
-    shape = Shape(vertices=named_shape(name))
-    assert 0.1 < shape.size < 0.16
-    assert len(shape.pieces) >= 2
 
 
 def test_random_polygons_are_reproducible_and_as_asked() -> None:
