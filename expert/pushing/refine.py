@@ -1,0 +1,59 @@
+"""The last push of a plan, made exact: three numbers of a push against three of a pose, by damped Gauss-Newton in batches."""
+
+import numpy as np
+
+from expert.geometry.pose import Array, rotation
+from expert.pushing.goal import Goal
+from expert.pushing.table import Table
+
+NUDGES = np.array([1.0, 0.02, 1.0])
+"""Differences for the Jacobian: arc length, angle [rad], length."""
+REACH = np.array([25.0, 0.5, 40.0])
+"""Steps are cut to this."""
+
+
+def composed(poses: Array, shifts: Array) -> Array:
+    """Poses (..., 3) after shifts (..., 3) in the body frame."""
+    moved = (rotation(poses[..., 2]) @ shifts[..., :2, None])[..., 0]
+    return np.concatenate([poses[..., :2] + moved, (poses[..., 2] + shifts[..., 2])[..., None]], axis=-1)
+
+
+def refine(
+    table: Table, goal: Goal, before: Array, parameters: Array, rounds: int, unit: float = 1.0
+) -> tuple[Array, Array, Array, Array]:
+    """Pushes (N, 3) from poses `before` (N, 3), improved towards the goal: pushes, poses after, fingers, errors (N,).
+
+    unit: length of which NUDGES and REACH are multiples.  A push never becomes worse, nor shorter than a unit.
+    """
+    scale = np.array([unit, 1.0, unit])
+    nudges, count = NUDGES * scale, len(parameters)
+    best = parameters.copy()
+    shifts, fingers = table.outcomes(best)
+    after = composed(before, shifts)
+    residual = goal.residual(after)
+    damping = np.full(count, 1e-3)
+    for _ in range(rounds):
+        probes = (best[:, None] + nudges * np.eye(3)).reshape(-1, 3)
+        probed = composed(np.repeat(before, 3, axis=0), table.outcomes(probes)[0])
+        slopes = (goal.residual(probed).reshape(count, 3, 3) - residual[:, None]).swapaxes(1, 2)
+        step = _damped(slopes, residual, damping) * nudges
+        trial = best + np.clip(step, -REACH * scale, REACH * scale)
+        trial[:, 2] = np.maximum(trial[:, 2], unit)
+        shifts, ends = table.outcomes(trial)
+        moved = composed(before, shifts)
+        found = goal.residual(moved)
+        better = (found**2).sum(1) < (residual**2).sum(1)
+        best[better], after[better], fingers[better], residual[better] = (
+            x[better] for x in (trial, moved, ends, found)
+        )
+        damping = np.where(better, damping / 5, damping * 20)
+    return best, after, fingers, np.sqrt((residual**2).sum(1))
+
+
+def _damped(slopes: Array, residual: Array, damping: Array) -> Array:
+    """Steps (N, 3) of least squares with Marquardt's scaling."""
+    normal = slopes.swapaxes(1, 2) @ slopes
+    diagonal = np.einsum("nii->ni", normal)
+    floor = 1e-9 * (diagonal.sum(1, keepdims=True) + 1e-300)
+    damped = normal + (damping[:, None] * diagonal + floor)[:, :, None] * np.eye(3)
+    return -np.linalg.solve(damped, slopes.swapaxes(1, 2) @ residual[..., None])[..., 0]

@@ -1,0 +1,220 @@
+"""Beam search over sequences of pushes from a table, scored in time: travel, push, and an estimate of the rest.
+
+Nothing is rolled out here: a push's outcome is the same in the body frame wherever the object is, so that a node costs one
+composition of poses.  Plans are compared that end at the goal, or have full depth; a shorter plan that misses would win by
+its estimate alone.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from expert.geometry.pose import Array
+from expert.pushing.roads import Roads, distances
+from expert.world.values import IntArray
+
+Nodes = np.ndarray[tuple[int], np.dtype[np.void]]
+
+
+class Moves(NamedTuple):
+    """A table for compiled code: see `Table`; leads (K, 2) are the farthest commands, in the frame before the push."""
+
+    ways: Roads
+    first: IntArray
+    shifts: Array
+    fingers: Array
+    leads: Array
+    steps: IntArray
+
+
+class Task(NamedTuple):
+    """Goals (G, 3), the body's centroid (2,) and its spread; the hull (H, 2) stays inside half-planes (W, 3): n, n . p.
+
+    The finger's centre stays inside half-planes (F, 3), and so do its commands.
+    """
+
+    goals: Array
+    centroid: Array
+    spread: float
+    hull: Array
+    walls: Array
+    finger_walls: Array
+
+
+class Prices(NamedTuple):
+    """Control steps for a miss, and for each length of the error; for start and stop; way per step; error worth mending."""
+
+    miss: float
+    error: float
+    travel: float
+    pace: float
+    capture: float
+
+
+NODE = np.dtype(
+    [(name, "f8") for name in ("score", "time", "error", "x", "y", "angle", "finger_x", "finger_y")]
+    + [(name, "i8") for name in ("parent", "entry")]
+)
+"""A partial plan: its last push is `entry` of the table; parent is its row among the nodes, -1 for the root."""
+
+
+def poses_of(nodes: Nodes) -> Array:
+    """Poses (n, 3) of nodes (n,)."""
+    return np.stack([nodes[name] for name in ("x", "y", "angle")], -1)
+
+
+@njit(cache=True, error_model="numpy")
+def error_of(task: Task, x: float, y: float, angle: float) -> float:
+    """Root-mean-square displacement from the nearest goal."""
+    c, s = np.cos(angle), np.sin(angle)
+    mx, my = x + c * task.centroid[0] - s * task.centroid[1], y + s * task.centroid[0] + c * task.centroid[1]
+    least = np.inf
+    for g in range(len(task.goals)):
+        gx, gy, turn = task.goals[g]
+        cg, sg = np.cos(turn), np.sin(turn)
+        dx = mx - gx - cg * task.centroid[0] + sg * task.centroid[1]
+        dy = my - gy - sg * task.centroid[0] - cg * task.centroid[1]
+        least = min(least, dx * dx + dy * dy + 2 * task.spread * (1 - np.cos(angle - turn)))
+    return np.sqrt(least)
+
+
+@njit(cache=True, error_model="numpy")
+def inside(walls: Array, x: float, y: float, slack: float) -> bool:
+    """Whether a point keeps to the free side of all half-planes, but for `slack`."""
+    for w in range(len(walls)):  # noqa: SIM110  (compiled)
+        if walls[w, 0] * x + walls[w, 1] * y < walls[w, 2] - slack:
+            return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def fits(task: Task, x: float, y: float, angle: float, slack: float) -> bool:
+    """Whether the hull does, at a pose."""
+    c, s = np.cos(angle), np.sin(angle)
+    for k in range(len(task.hull)):
+        hx, hy = task.hull[k]
+        if not inside(task.walls, x + c * hx - s * hy, y + s * hx + c * hy, slack):
+            return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def depth_in_walls(task: Task, pose: Array) -> float:
+    """How far the hull reaches into walls at a pose; 0 outside of them."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    worst = 0.0
+    for k in range(len(task.hull)):
+        x = pose[0] + c * task.hull[k, 0] - s * task.hull[k, 1]
+        y = pose[1] + s * task.hull[k, 0] + c * task.hull[k, 1]
+        for w in range(len(task.walls)):
+            worst = max(worst, task.walls[w, 2] - task.walls[w, 0] * x - task.walls[w, 1] * y)
+    return worst
+
+
+@njit(cache=True, error_model="numpy")
+def beam_search(
+    moves: Moves, task: Task, prices: Prices, pose: Array, finger: Array, depth: int, width: int, endings: int
+) -> tuple[Nodes, Nodes]:
+    """Nodes of the beam, level after level, and the best `endings`: pushes that end within the capture radius.
+
+    Both sorted by score within their level; unfilled rows have score inf.
+    """
+    nodes, ends, root = _empty(depth * width), _empty(endings), _empty(1)
+    root[0].x, root[0].y, root[0].angle = pose
+    root[0].finger_x, root[0].finger_y = finger
+    slack = depth_in_walls(task, pose) + 1e-9
+    _expand(moves, task, prices, root, -1, nodes[:width], ends, slack)
+    for level in range(1, depth):
+        for k in range((level - 1) * width, level * width):
+            if nodes[k].score < np.inf:
+                beam = nodes[level * width : (level + 1) * width]
+                _expand(moves, task, prices, nodes[k : k + 1], k, beam, ends, slack)
+    return nodes, ends
+
+
+@njit(cache=True, error_model="numpy")
+def _empty(count: int) -> Nodes:
+    """Unfilled nodes."""
+    nodes = np.zeros(count, NODE)
+    for k in range(count):
+        nodes[k].score, nodes[k].parent, nodes[k].entry = np.inf, -1, -1
+    return nodes
+
+
+@njit(cache=True, error_model="numpy")
+def _expand(
+    moves: Moves, task: Task, prices: Prices, at: Nodes, row: int, beam: Nodes, ends: Nodes, slack: float
+) -> None:
+    """Children of one node, from all stations that the finger can reach."""
+    node = at[0]
+    c, s = np.cos(node.angle), np.sin(node.angle)
+    stations = len(moves.first) - 1
+    ways, corner = np.empty(stations), np.empty(stations, np.int64)
+    distances(moves.ways, node.finger_x, node.finger_y, ways, corner)
+    for station in range(stations):
+        sx, sy = moves.ways.stations[station]
+        x, y = node.x + c * sx - s * sy, node.y + s * sx + c * sy
+        if ways[station] < np.inf and inside(task.finger_walls, x, y, 0.0):
+            start = node.time + prices.travel + ways[station] / prices.pace
+            _push(moves, task, prices, at, row, station, start, beam, ends, slack)
+
+
+@njit(cache=True, error_model="numpy")
+def _push(
+    moves: Moves,
+    task: Task,
+    prices: Prices,
+    at: Nodes,
+    row: int,
+    station: int,
+    start: float,
+    beam: Nodes,
+    ends: Nodes,
+    slack: float,
+) -> None:
+    """Put the best push from a station into the beam, and what ends near the goal among the endings."""
+    node, child, best = at[0], _empty(1), _empty(1)
+    c, s = np.cos(node.angle), np.sin(node.angle)
+    best[0].score = beam[-1].score
+    for entry in range(moves.first[station], moves.first[station + 1]):
+        time = start + moves.steps[entry]
+        if time + prices.miss >= best[0].score and time >= ends[-1].score:
+            continue
+        dx, dy, turn = moves.shifts[entry]
+        x, y, angle = node.x + c * dx - s * dy, node.y + s * dx + c * dy, node.angle + turn
+        error = error_of(task, x, y, angle)
+        soon = time + prices.error * error
+        good, ending = soon + prices.miss < best[0].score, error <= prices.capture and soon < ends[-1].score
+        lead_x, lead_y = moves.leads[entry]
+        if (
+            (good or ending)
+            and inside(
+                task.finger_walls, node.x + c * lead_x - s * lead_y, node.y + s * lead_x + c * lead_y, 0.0
+            )
+            and fits(task, x, y, angle, slack)
+        ):
+            new = child[0]
+            new.time, new.error, new.parent, new.entry = time, error, row, entry
+            new.x, new.y, new.angle = x, y, angle
+            new.finger_x, new.finger_y = moves.fingers[entry]
+            if ending:
+                new.score = soon
+                _insert(ends, child)
+            if good:
+                new.score = soon + prices.miss
+                best[0] = child[0]
+    if best[0].entry >= 0:
+        _insert(beam, best)
+
+
+@njit(cache=True, error_model="numpy")
+def _insert(rows: Nodes, new: Nodes) -> None:
+    """Keep the rows sorted by score; the last one falls out."""
+    k = len(rows) - 1
+    if new[0].score >= rows[k].score:
+        return
+    while k > 0 and rows[k - 1].score > new[0].score:
+        rows[k] = rows[k - 1]
+        k -= 1
+    rows[k] = new[0]

@@ -1,0 +1,111 @@
+"""What pushes do to an object, in its own frame: rolled out once, composed ever after."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from expert.geometry.pose import Array
+from expert.pushing.contour import Contour, contour, turned
+from expert.pushing.roads import Roads, roads
+from expert.world.shape import Shape
+from expert.world.values import IntArray, require
+
+
+class PushModel(Protocol):
+    """How an object answers to straight pushes by a disc of `radius`; frame: the shape's, moved to `origin`."""
+
+    @property
+    def shape(self) -> Shape: ...
+    @property
+    def origin(self) -> Array: ...
+    @property
+    def radius(self) -> float: ...
+    def steps(self, lengths: Array) -> IntArray:
+        """Control steps of pushes of lengths (N,)."""
+
+    def leads(self, lengths: Array) -> Array:
+        """How far the commands of such pushes reach beyond their starts (N,)."""
+
+    def outcomes(self, starts: Array, directions: Array, lengths: Array) -> tuple[Array, Array]:
+        """Pose changes (N, 3), and the finger's end in the new frame (N, 2), of pushes along unit directions (N, 2)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Grid:
+    """Which pushes a table holds: stations on the stand-off curve, angles to its normal [rad], lengths; gap of the curve."""
+
+    stations: int = 60
+    angles: tuple[float, ...] = tuple(np.deg2rad([-45, -30, -15, 0, 15, 30, 45]))
+    lengths: tuple[float, ...] = (16, 22, 28, 36, 44, 54, 66, 80, 96, 112, 130, 150, 170, 190)
+    gap: float = 6.0
+    least: float = 1.0
+
+    def __post_init__(self) -> None:
+        require(self.stations >= 3, "grid.stations", "at least 3", self.stations)
+        require(len(self.angles) > 0 and len(self.lengths) > 0, "grid", "angles and lengths", "none")
+        require(min(self.lengths) > 0 and self.gap >= 0, "grid", "positive lengths", min(self.lengths))
+
+
+@dataclass(frozen=True)
+class Table:
+    """Pushes K, sorted by station: parameters (K, 3) = (arc length, angle, length), pose changes (K, 3), fingers (K, 2), steps (K,).
+
+    Pushes of station s are those from first[s] to first[s + 1].
+    """
+
+    model: PushModel
+    curve: Contour
+    gap: float
+    parameters: Array
+    shifts: Array
+    fingers: Array
+    steps: IntArray
+    first: IntArray
+
+    @cached_property
+    def stations(self) -> Array:
+        """Arc lengths (S,) of the stations."""
+        count = len(self.first) - 1
+        return np.arange(count) * self.curve.length / count
+
+    @cached_property
+    def ways(self) -> Roads:
+        """The finger's ways round the object to the stations."""
+        points, _ = self.curve.at(self.stations)
+        return roads(self.model.shape, self.model.origin, self.model.radius, self.gap, points)
+
+    def outcomes(self, parameters: Array) -> tuple[Array, Array]:
+        """Pose changes (N, 3) and fingers (N, 2) of any pushes (N, 3), in the table or between its entries."""
+        return self.model.outcomes(*straight(self.curve, parameters))
+
+
+def straight(curve: Contour, parameters: Array) -> tuple[Array, Array, Array]:
+    """Starts (N, 2), unit directions (N, 2) and lengths (N,) of pushes (arc length, angle, length)."""
+    starts, normals = curve.at(parameters[:, 0])
+    return starts, turned(normals, parameters[:, 1]), parameters[:, 2]
+
+
+def push_table(model: PushModel, grid: Grid) -> Table:
+    """Roll out all pushes of a grid; those that move the object by less than grid.least are left out."""
+    curve = contour(model.shape, model.origin, model.radius + grid.gap)
+    stations = np.arange(grid.stations) * curve.length / grid.stations
+    axes = np.meshgrid(stations, grid.angles, grid.lengths, indexing="ij")
+    parameters = np.stack([axis.ravel() for axis in axes], -1)
+    shifts, fingers = model.outcomes(*straight(curve, parameters))
+    size = model.shape.size / 2
+    moved = np.hypot(np.hypot(shifts[:, 0], shifts[:, 1]), size * shifts[:, 2]) >= grid.least
+    station = np.repeat(np.arange(grid.stations), len(grid.angles) * len(grid.lengths))[moved]
+    first = np.searchsorted(station, np.arange(grid.stations + 1))
+    parameters = parameters[moved]
+    return Table(
+        model,
+        curve,
+        grid.gap,
+        parameters,
+        shifts[moved],
+        fingers[moved],
+        model.steps(parameters[:, 2]),
+        first,
+    )
