@@ -9,6 +9,7 @@ import subprocess
 import sys
 import warnings
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -46,8 +47,8 @@ class Parsed(Exception):
     """The command's arguments are understood."""
 
 
-def parse(module: str, arguments: list[str], monkeypatch: pytest.MonkeyPatch) -> argparse.Namespace:
-    """What the parser of `python -m module` makes of arguments; nothing else runs.  Leaves with SystemExit if it refuses."""
+def parse(program: str, arguments: list[str], monkeypatch: pytest.MonkeyPatch) -> argparse.Namespace:
+    """What the parser of a module, or of a script, makes of arguments; nothing else runs.  Leaves with SystemExit if it refuses."""
     answers = []
     original = argparse.ArgumentParser.parse_args
 
@@ -58,9 +59,14 @@ def parse(module: str, arguments: list[str], monkeypatch: pytest.MonkeyPatch) ->
     with monkeypatch.context() as patched, warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # runpy minds modules that are imported already
         patched.setattr(argparse.ArgumentParser, "parse_args", stop)
-        patched.setattr(sys, "argv", [module, *arguments])
+        patched.setattr(sys, "argv", [program, *arguments])
+        execute = (
+            partial(runpy.run_path, str(ROOT / program))
+            if program.endswith(".py")
+            else partial(runpy.run_module, program)
+        )
         with pytest.raises(Parsed):
-            runpy.run_module(module, run_name="__main__")
+            execute(run_name="__main__")
     return answers[0]
 
 
