@@ -6,10 +6,11 @@ Exit codes: 0 solved, sound or drawn; 1 refuted (or a solver that failed); 2 bad
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import get_args, get_type_hints
+from typing import NoReturn, get_args, get_type_hints
 
 from expert import commands
 from expert.errors import ExpertError, InvalidProblem
@@ -35,13 +36,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
         # A computation may still run in its thread, in compiled code that cannot be stopped otherwise.
         os._exit(commands.INTERRUPTED)
+    except BrokenPipeError:  # whoever reads the output has had enough: nothing to complain about
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return commands.REFUTED
     return code
 
 
+class _Parser(argparse.ArgumentParser):
+    """Says in one line what is wrong with a command line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(commands.BAD_INPUT, f"error: {message}; see {self.prog} --help\n")
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="python -m expert", description="Plan, check and draw planar manipulation."
-    )
+    parser = _Parser(prog="python -m expert", description="Plan, check and draw planar manipulation.")
     subparsers = parser.add_subparsers(required=True, metavar="solve | verify | draw")
 
     solve = subparsers.add_parser("solve", help="read a problem file, write a solution file")
@@ -73,4 +82,5 @@ def _methods() -> str:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # asked to end, it cleans up as after Ctrl-C
     sys.exit(main())

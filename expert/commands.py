@@ -9,13 +9,16 @@ import json
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from expert.files import Problem, problem_of, read_problem, solution_of, write_solution
-from expert.files.document import load, save, writable
+from expert.errors import InvalidProblem
+from expert.files import Problem, problem_of, read_problem, solution_fields, solution_of
+from expert.files.document import encoded, load
+from expert.files.output import Output
 from expert.files.section import jsonable
 from expert.kinds import KINDS
 
@@ -25,22 +28,39 @@ VERDICTS = {"sound": SOLVED, "caged": SOLVED, "certified": SOLVED, "refuted": RE
 
 def solve(options: argparse.Namespace) -> int:
     """Read a problem file, solve it, write a solution file."""
-    if options.output:
-        writable(options.output)
-    problem = read_problem(options.file)
-    if options.method:
-        # Through the reader once more, so that a wrong method is refused like a wrong file.
-        chosen = {**(problem.data.get("options") or {}), "method": options.method}
-        problem = problem_of({**problem.data, "options": chosen})
-    kind = KINDS[problem.kind]
-    with _progress(f"solving {options.file.name}"):
-        answer = _interruptible(lambda: kind.solve(problem.task, **problem.options))
-    if options.output:
-        write_solution(options.output, problem, answer)
+    with _reserved(options) as output:
+        problem = _read_with_method(options.file, options.method)
+        kind = KINDS[problem.kind]
+        with _progress(f"solving {options.file.name}"):
+            answer = _interruptible(lambda: kind.solve(problem.task, **problem.options))
+        if output:
+            output.deliver(encoded(solution_fields(problem, answer)))
     _report_solution(options, answer)
     if answer.status == "infeasible":
         return INFEASIBLE
     return SOLVED if answer.status in kind.solved else UNKNOWN
+
+
+def _read_with_method(path: Path, method: str | None) -> Problem:
+    problem = read_problem(path)
+    if not method:
+        return problem
+    # Through the reader once more, so that a wrong method is refused like a wrong file.
+    chosen = {**(problem.data.get("options") or {}), "method": method}
+    return problem_of({**problem.data, "options": chosen})
+
+
+@contextlib.contextmanager
+def _reserved(options: argparse.Namespace) -> Iterator[Output | None]:
+    """The output that is asked for, if any; never the input itself."""
+    if options.output is None:
+        yield None
+        return
+    with contextlib.suppress(OSError):  # one of them does not exist
+        if options.output.samefile(options.file):
+            raise InvalidProblem("output", expected="another file than the input", got=str(options.output))
+    with Output(options.output) as output:
+        yield output
 
 
 def _report_solution(options: argparse.Namespace, answer: Any) -> None:
@@ -62,20 +82,20 @@ def _brief(value: Any) -> str:
 
 def verify(options: argparse.Namespace) -> int:
     """Check a solution file, or a problem file that states what there is to check; write a certificate."""
-    if options.output:
-        writable(options.output)
-    problem, answer = _read_either(load(options.file))
-    with _progress(f"checking {options.file.name}"):
-        report = _interruptible(lambda: KINDS[problem.kind].verify(problem.task, answer))
-    if options.output:
-        save(options.output, report.as_dict())
-    print(report)
+    with _reserved(options) as output:
+        problem, answer = _read_either(load(options.file))
+        with _progress(f"checking {options.file.name}"):
+            report = _interruptible(lambda: KINDS[problem.kind].verify(problem.task, answer))
+        print(report)
+        if output:
+            output.deliver(encoded(report.as_dict()))
     return VERDICTS.get(report.verdict, UNKNOWN)
 
 
 def draw(options: argparse.Namespace) -> int:
     """Draw a solution file, or a problem file that states what there is to draw."""
-    writable(options.output)
+    with _reserved(options):
+        pass  # the drawing writes its file itself
     problem, answer = _read_either(load(options.file))
     with _progress(f"drawing {options.output.name}"):
         KINDS[problem.kind].draw(problem.task, answer, options.output, options.view)

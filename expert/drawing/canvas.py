@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from expert.errors import InvalidProblem
-from expert.files.document import write_atomically
+from expert.files.output import write_atomically
 from expert.geometry.pose import Array, perpendicular
 from expert.world.walls import HalfPlane
 

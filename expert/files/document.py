@@ -1,9 +1,8 @@
-"""YAML and JSON text to plain mappings and back.  Reads strictly, writes atomically."""
+"""YAML and JSON text to plain mappings and back.  Reads strictly."""
 
 import json
 import os
 import re
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import yaml
 
 from expert.errors import InvalidProblem
+from expert.files.output import write_atomically
 
 
 class _StrictLoader(yaml.SafeLoader):
@@ -94,36 +94,11 @@ def _reason(error: Exception) -> str:
 
 
 def save(path: str | os.PathLike[str], data: Mapping[str, Any]) -> None:
-    """Write JSON, one line per top-level key, all or nothing.  Raises InvalidProblem where the place cannot be written."""
+    """Write JSON, all or nothing.  Raises InvalidProblem where the place cannot be written."""
+    write_atomically(path, encoded(data))
+
+
+def encoded(data: Mapping[str, Any]) -> bytes:
+    """JSON, one line per top-level key."""
     lines = ",\n".join(f" {json.dumps(k)}: {json.dumps(v, allow_nan=False)}" for k, v in data.items())
-    write_atomically(path, f"{{\n{lines}\n}}\n".encode())
-
-
-def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
-    """Replace the file at once, so that neither a crash nor Ctrl-C leaves half of it."""
-    path = Path(path)
-    writable(path)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
-def writable(path: str | os.PathLike[str]) -> None:
-    """Raise InvalidProblem unless a file can be put there: asked before long work, not after it."""
-    path = Path(path)
-    if path.is_dir() or not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
-        raise InvalidProblem(
-            "output", expected="a file in a writable folder", got=str(path), remedy="create the folder"
-        )
+    return f"{{\n{lines}\n}}\n".encode()
