@@ -1,28 +1,21 @@
 """Making a data set in parallel, shard by shard, so that a job killed at any moment goes on where it stopped."""
 
 import functools
-import os
 import platform
-import signal
 import sys
-import threading
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-import joblib
-from joblib.externals.loky.process_executor import BrokenProcessPool
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from threadpoolctl import threadpool_limits
 
 import datasets
 import expert
 from datasets.card import card
 from datasets.motions import FAMILIES
+from datasets.parallel import Backend, progress_bar, side_by_side
 from datasets.specification import Specification, draw
 from datasets.store import (
     KIND,
@@ -37,7 +30,7 @@ from datasets.store import (
     write_manifest,
     write_whole,
 )
-from expert.errors import InvalidProblem, SolverFailed
+from expert.errors import InvalidProblem
 from expert.world.values import require
 
 PACKAGES = ("certified-manipulation", "numpy", "scipy", "shapely", "numba", "daqp", "opencv-python-headless")
@@ -55,7 +48,7 @@ class Generation:
     seed: int
     out: Path
     jobs: int = 2
-    backend: Literal["loky", "ray"] = "loky"
+    backend: Backend = "loky"
     overwrite: bool = False
 
     def __post_init__(self) -> None:
@@ -175,14 +168,11 @@ def _is_made(folder: Path, shard: int, fingerprint: str) -> bool:
     return bool(about["fingerprint"] == fingerprint)
 
 
-def make_shard(
-    specification: Specification, seed: int, shard: int, fingerprint: str, master: int
-) -> tuple[int, bytes]:
-    """A shard's number and bytes.  Runs in a worker, which leaves interrupts to the master process."""
-    if os.getpid() != master and threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+def make_shard(job: Generation, shard: int, fingerprint: str) -> tuple[int, bytes]:
+    """A shard's number and bytes."""
+    specification = job.specification
     with threadpool_limits(1):  # the sums of a threaded BLAS may depend on the number of threads
-        drawn = [draw(specification, seed, index) for index in specification.indices(shard)]
+        drawn = [draw(specification, job.seed, index) for index in specification.indices(shard)]
     failed = [failure for _, failures in drawn for failure in failures]
     return shard, encode_shard([sample for sample, _ in drawn], failed, specification, fingerprint)
 
@@ -190,15 +180,14 @@ def make_shard(
 def _make(job: Generation, missing: list[int], fingerprint: str) -> None:
     """Make and store the missing shards, in whatever order they come."""
     total = job.specification.count
-    todo = sum(len(job.specification.indices(k)) for k in missing)
-    console = Console(stderr=True)
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    done = total - sum(len(job.specification.indices(k)) for k in missing)
+    calls = [functools.partial(make_shard, job, k, fingerprint) for k in missing]
     try:
-        with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
-            bar = progress.add_task(f"{job.specification.name}: tasks", total=total, completed=total - todo)
-            for shard, data in _results(job, missing, fingerprint):
+        with progress_bar(f"{job.specification.name}: tasks", total, done) as show:
+            for shard, data in side_by_side(calls, jobs=job.jobs, backend=job.backend):
                 write_whole(shard_path(job.out, shard), data)
-                progress.advance(bar, len(job.specification.indices(shard)))
+                done += len(job.specification.indices(shard))
+                show(done)
     except KeyboardInterrupt:
         made = sum(_is_made(job.out, k, fingerprint) for k in range(job.specification.shards))
         print(
@@ -207,38 +196,6 @@ def _make(job: Generation, missing: list[int], fingerprint: str) -> None:
             file=sys.stderr,
         )
         raise
-
-
-def _results(job: Generation, missing: list[int], fingerprint: str) -> Iterator[tuple[int, bytes]]:
-    """Shards as they are made.  Ray's backend returns only whole batches, so it is given one after another."""
-    if job.backend == "ray":
-        _register_ray()
-    calls = [
-        joblib.delayed(make_shard)(job.specification, job.seed, k, fingerprint, os.getpid()) for k in missing
-    ]
-    with joblib.parallel_config(backend=job.backend, n_jobs=job.jobs):
-        try:
-            if job.backend == "loky":
-                yield from joblib.Parallel(return_as="generator_unordered", batch_size=1)(calls)
-                return
-            wave = 4 * joblib.effective_n_jobs(job.jobs)
-            for start in range(0, len(calls), wave):
-                yield from joblib.Parallel(batch_size=1)(calls[start : start + wave])
-        except BrokenProcessPool as error:
-            raise SolverFailed(f"a worker died ({error}); the same command goes on from there") from error
-
-
-def _register_ray() -> None:
-    try:
-        from ray.util.joblib import register_ray
-    except ImportError as error:
-        raise InvalidProblem(
-            "backend",
-            expected="an installed backend",
-            got="ray, which is not",
-            remedy="pip install certified-manipulation[ray]",
-        ) from error
-    register_ray()
 
 
 def _summary(job: Generation, request: Manifest) -> Manifest:

@@ -90,3 +90,9 @@ def read_all(folders: Mapping[str, str | Path], *, train_tasks: int | None = Non
     wanted = {name: (folder, train_tasks if name == "train" else None) for name, folder in folders.items()}
     read = {part: TaskBatch.read(*part) for part in dict.fromkeys(wanted.values())}
     return {name: read[part] for name, part in wanted.items()}
+
+
+def first(tasks: Mapping[str, TaskBatch], most: int | None) -> dict[str, TaskBatch]:
+    """The first so many tasks of each data set; None: all."""
+    require(most is None or (isinstance(most, int) and most >= 2), "tasks", "a number of at least 2", most)
+    return {name: batch[torch.arange(min(most or len(batch), len(batch)))] for name, batch in tasks.items()}

@@ -176,6 +176,18 @@ def test_the_report_fits_desks_and_telephones(results: Path, tmp_path: Path, wid
 
 
 @pytest.mark.slow
+def test_the_command_that_training_names_judges_the_structured_model_too(workplace: Path) -> None:
+    stages = ["model=structured", "stage=structured/mdr", "output=runs/structured"]
+    said = finish(start("train.py", *QUICK, *stages, "train_tasks=2", cwd=workplace))
+    (following,) = re.findall(r"^next: python (.*)$", said, re.MULTILINE)
+    finish(start(*following.split(), "examples=1", cwd=workplace))
+    lines = json.loads((workplace / "runs" / "structured" / "table_4_1.json").read_text())["lines"]
+    assert [line["model"] for line in lines] == ["no action", "MDR", "MIQP (oracle)"]
+    assert lines[1]["cells"]["test"]["unsolved"] == [[]]
+    assert lines[1]["cells"]["test"]["tasks"] == 4
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "stage", "seeds"), [("thesis", "mdr", (3, 4)), ("structured", "structured/mdr", (3,))]
 )
@@ -286,6 +298,8 @@ WRONG: dict[str, tuple[Callable[[], None], list[str], str]] = {
     "another model": (TRAIN, [SMOKE, "stage=cvx", BAD], r"mdr\.safetensors: expected"),
     "other settings": (TRAIN, [SMOKE, "stage=nn", BAD, "resume=true", "schedule.learning_rate=1e-3"], r"learning_rate"),
     "nothing trained": (EVALUATE, [SMOKE, "output=nowhere"], r"nowhere/seed_0/nn\.safetensors.*python train\.py stage=nn"),
+    "no stages": (EVALUATE, [SMOKE, "stages=[]"], r"stages: expected at least one stage"),
+    "no tasks": (EVALUATE, [SMOKE, "tasks=1"], r"tasks: expected a number of at least 2, got 1"),
     "no seeds": (EVALUATE, [SMOKE, "seeds=[]"], r"seeds: expected at least one seed"),
     "one stage another": (EVALUATE, [SMOKE, BAD], r"mdr\.safetensors: expected stage mdr, got stage nn"),
 }  # fmt: skip

@@ -35,6 +35,26 @@ class Extra:
                 self.title, expected="rows as long as columns, or series", got=f"{len(uneven)} uneven rows"
             )
 
+    def cells(self) -> list[list[str]]:
+        """Rows of the table as text."""
+        return [[_cell(value) for value in row] for row in self.rows]
+
+    def chart(self) -> Figure:
+        """Lines through the points of every series, on logarithmic axes."""
+        figure = Figure(figsize=(6.5, 4), layout="constrained")
+        ax = figure.subplots()
+        for name, points in self.series.items():
+            x, y = zip(*sorted(points), strict=True)
+            ax.plot(x, y, "o-", lw=1.4, ms=4, label=name)
+        ax.set(xlabel=self.x, ylabel=self.y, xscale="log", yscale="log")
+        ax.grid(alpha=0.25, which="both", lw=0.5)
+        ax.legend(fontsize=8)
+        return figure
+
+
+def _cell(value: str | float | int | None) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else "–" if value is None else str(value)
+
 
 def read_extras(paths: Iterable[str | Path]) -> list[Extra]:
     """Results in files, and in all JSON files of folders.  Raises InvalidProblem for a file that holds none."""
@@ -51,16 +71,3 @@ def _read(path: Path) -> Extra:
         raise InvalidProblem(
             f"extras {path}", expected="a table or a chart of results", got=f"{error}".splitlines()[0]
         ) from error
-
-
-def chart(extra: Extra) -> Figure:
-    """Lines through the points of every series, on logarithmic axes."""
-    figure = Figure(figsize=(6.5, 4), layout="constrained")
-    ax = figure.subplots()
-    for name, points in extra.series.items():
-        x, y = zip(*sorted(points), strict=True)
-        ax.plot(x, y, "o-", lw=1.4, ms=4, label=name)
-    ax.set(xlabel=extra.x, ylabel=extra.y, xscale="log", yscale="log")
-    ax.grid(alpha=0.25, which="both", lw=0.5)
-    ax.legend(fontsize=8)
-    return figure

@@ -16,13 +16,12 @@ from dlm.evaluation.report import Example, Report
 from dlm.evaluation.significance import Comparison, compare_all
 from dlm.evaluation.table import Cell, Line, Table
 from dlm.evaluation.timing import backward_seconds, expert_seconds, forward_seconds
+from dlm.evaluation.trained import Trained
 from dlm.execution import expert_action, idle_action
 from dlm.inverse_dynamics.layer import Action
-from dlm.policy import Policy
 from dlm.simulator import SimulatorSettings
-from dlm.tasks import TaskBatch
-from dlm.training.checkpoint import About, versions
-from dlm.training.stage import Stage
+from dlm.tasks import TaskBatch, first
+from dlm.training.checkpoint import versions
 
 Seconds = tuple[float | None, float | None]
 """Forward and backward, per task."""
@@ -31,22 +30,11 @@ IDLE, ORACLE = "no action", "MIQP (oracle)"
 CROSSWISE = (("NN", "MDR"), ("NNM", "DLM"))
 """Compared beside every stage and the one that it starts from: networks alone and with the program."""
 
+TIMED = 20
+"""Tasks of the batch on which backward passes are timed, as many as the thesis trains on."""
+
 Outcomes = Mapping[str, Mapping[str, list[Outcome]]]
 """Of every row on every data set, one per seed."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Trained:
-    """One architecture, trained: its stage, and policy and record of every seed."""
-
-    stage: Stage
-    policies: Sequence[Policy]
-    abouts: Sequence[About]
-
-    @property
-    def title(self) -> str:
-        """As in the table."""
-        return self.stage.name.upper()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +95,7 @@ class Study:
 
     def _seconds(self, one: Trained) -> Seconds:
         policy = one.policies[0]
-        tasks = self.tasks[one.stage.dataset]
+        tasks = first(self.tasks, TIMED)[one.stage.dataset]
         return forward_seconds(policy, self.tasks["test"]), backward_seconds(policy, one.stage.loss, tasks)
 
     def _comparisons(self, outcomes: Outcomes) -> list[Comparison]:

@@ -2,14 +2,13 @@
 
 from collections.abc import Mapping
 
-import torch
 from matplotlib.figure import Figure
 
 from dlm.evaluation.outcomes import act, execute
 from dlm.evaluation.picture import derendered, task_figure
 from dlm.policy import Policy
 from dlm.simulator import SimulatorSettings
-from dlm.tasks import TaskBatch
+from dlm.tasks import TaskBatch, first
 from dlm.training.loop import Row, Watch
 
 MOST = 40
@@ -18,7 +17,7 @@ MOST = 40
 
 def watch(tasks: Mapping[str, TaskBatch], simulator: SimulatorSettings) -> Watch:
     """Finger- and object-trajectory losses on every data set (the curves of Fig. 4-6), and a picture of one test task."""
-    few = {name: batch[torch.arange(min(MOST, len(batch)))] for name, batch in tasks.items()}
+    few = first(tasks, MOST)
 
     def measure(policy: Policy) -> Row:
         row: Row = {}

@@ -1,6 +1,7 @@
 """What the stages of `model: structured` learn by: classes (MDR), classes and what they cost (CVX), simulated motion (DLM)."""
 
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -137,17 +138,19 @@ class _Differences(torch.autograd.Function):
     def forward(
         ctx: Any, knobs: Tensor, policy: ProposalPolicy, tasks: TaskBatch, loss: CalibrationLoss
     ) -> Tensor:
-        """The loss; a knob has a slope only where a step along it lowers the loss by what is worth a move."""
+        """The loss."""
         here = knobs.detach().numpy().copy()
-        value, slopes = loss.at(policy, tasks, here), np.zeros(len(here))
-        for k in range(len(here)):
-            step = loss.step * np.eye(len(here))[k]
-            ahead, behind = (loss.at(policy, tasks, here + sign * step) for sign in (1, -1))
-            if min(ahead, behind) < value - loss.worth:
-                slopes[k] = (ahead - behind) / (2 * loss.step)
-        ctx.slopes = torch.from_numpy(slopes)
+        value = loss.at(policy, tasks, here)
+        ctx.at, ctx.here, ctx.value, ctx.loss = partial(loss.at, policy, tasks), here, value, loss
         return torch.tensor(value, dtype=torch.float64)
 
     @staticmethod
     def backward(ctx: Any, *adjoints: Tensor) -> tuple[Tensor | None, ...]:
-        return adjoints[0] * ctx.slopes, None, None, None
+        """A knob has a slope only where a step along it lowers the loss by what is worth a move."""
+        loss, slopes = ctx.loss, np.zeros(len(ctx.here))
+        for k in range(len(slopes)):
+            step = loss.step * np.eye(len(slopes))[k]
+            ahead, behind = (ctx.at(ctx.here + sign * step) for sign in (1, -1))
+            if min(ahead, behind) < ctx.value - loss.worth:
+                slopes[k] = (ahead - behind) / (2 * loss.step)
+        return adjoints[0] * torch.from_numpy(slopes), None, None, None

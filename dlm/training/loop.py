@@ -12,10 +12,9 @@ from pathlib import Path
 
 import torch
 from matplotlib.figure import Figure
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from torch.utils.tensorboard import SummaryWriter
 
+from datasets.parallel import progress_bar
 from dlm.policy import Loss, Policy, seeded
 from dlm.tasks import TaskBatch
 from dlm.training.checkpoint import (
@@ -31,6 +30,16 @@ from expert.errors import InvalidProblem, SolverFailed
 from expert.world.values import require
 
 Row = dict[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record:
+    """Where the checkpoints of a stage go, and what they say of it: the model's name, and settings as plain values."""
+
+    path: Path
+    stage: Stage
+    model: str
+    settings: Mapping[str, object]
 
 
 class Training:
@@ -73,13 +82,13 @@ class Training:
         self.optimiser.step()
         return loss.item()
 
-    def checkpoint(self, stage: Stage, model: str, settings: dict[str, object]) -> Checkpoint:
+    def checkpoint(self, record: Record) -> Checkpoint:
         """The state as it is, with what made it."""
         about = About(
-            stage=stage.name,
-            model=model,
+            stage=record.stage.name,
+            model=record.model,
             iteration=self.iteration,
-            settings=settings,
+            settings=dict(record.settings),
             data=self.tasks.fingerprint,
             history=self.history,
             seconds=self.seconds,
@@ -91,9 +100,9 @@ class Training:
             random=torch.get_rng_state(),
         )
 
-    def restore(self, saved: Checkpoint, *, path: Path, model: str) -> None:
+    def restore(self, saved: Checkpoint, record: Record) -> None:
         """Go back to a saved state."""
-        restore_weights(self.policy.weights(), saved, name=model, source=path)
+        restore_weights(self.policy.weights(), saved, name=record.model, source=record.path)
         restore_optimiser(self.optimiser, saved.optimiser)
         torch.set_rng_state(saved.random)
         self.iteration, self.history = saved.about.iteration, list(saved.about.history)
@@ -108,35 +117,26 @@ class Watch:
     picture: Callable[[Policy], Figure]
 
 
-def fit(
-    training: Training,
-    stage: Stage,
-    *,
-    path: Path,
-    model: str,
-    settings: dict[str, object],
-    watch: Watch,
-    resume: bool,
-) -> None:
-    """Train to the end of the schedule, with a checkpoint at `path` and curves for TensorBoard beside it."""
-    curves = path.parent / "tensorboard" / stage.name
+def fit(training: Training, record: Record, *, watch: Watch, resume: bool) -> None:
+    """Train to the end of the schedule, with checkpoints as recorded and curves for TensorBoard beside them."""
+    path, title = record.path, record.stage.name
+    curves = path.parent / "tensorboard" / title
     with seeded(training.schedule.seed):
         if resume and path.exists():
-            training.restore(checked(path, stage, training.tasks, settings), path=path, model=model)
+            training.restore(checked(record, training.tasks), record)
         else:
             shutil.rmtree(curves, ignore_errors=True)
         with SummaryWriter(str(curves), purge_step=training.iteration + 1) as writer:
             try:
-                for loss in _iterations(training, stage.name):
+                for loss in _iterations(training, title):
                     if training.is_due(training.schedule.log_every) or training.iteration == 1:
                         _log(training, loss, watch, writer)
                     if training.is_due(training.schedule.save_every):
-                        training.checkpoint(stage, model, settings).save(path)
+                        training.checkpoint(record).save(path)
             except KeyboardInterrupt:
                 again = f"resume=true goes on from {path}" if path.exists() else "nothing was saved yet"
                 print(
-                    f"interrupted after {training.iteration} iterations of {stage.name}; {again}",
-                    file=sys.stderr,
+                    f"interrupted after {training.iteration} iterations of {title}; {again}", file=sys.stderr
                 )
                 raise
             writer.add_figure("scene", watch.picture(training.policy), training.iteration)
@@ -145,19 +145,19 @@ def fit(
 def _iterations(training: Training, title: str) -> Iterator[float]:
     """Losses of the iterations that are left, with a progress bar."""
     total = training.schedule.iterations
-    with _progress() as progress:
-        bar = progress.add_task(title, total=total, completed=training.iteration)
+    with progress_bar(title, total, training.iteration) as show:
         start = time.process_time()
         while training.iteration < total:
             loss = training.iterate()
             start, before = time.process_time(), start
             training.seconds += start - before  # with what was measured since the iteration before
             yield loss
-            progress.update(bar, completed=training.iteration, description=f"{title} {loss:.3g}")
+            show(training.iteration, f"{title} {loss:.3g}")
 
 
-def checked(path: Path, stage: Stage, tasks: TaskBatch, settings: Mapping[str, object]) -> Checkpoint:
-    """A checkpoint that this very training may continue.  Raises InvalidProblem where data or settings have changed."""
+def checked(record: Record, tasks: TaskBatch) -> Checkpoint:
+    """The checkpoint that this very training may continue.  Raises InvalidProblem where data or settings have changed."""
+    path, stage = record.path, record.stage
     saved = load(path, command=f"python train.py stage={stage.name}")
     again = "resume=false trains from the start"
     if saved.about.data != tasks.fingerprint:
@@ -167,7 +167,7 @@ def checked(path: Path, stage: Stage, tasks: TaskBatch, settings: Mapping[str, o
             got=f"data set {stage.dataset} with other contents",
             remedy=again,
         )
-    if name := _first_difference(saved.about.settings, settings):
+    if name := _first_difference(saved.about.settings, record.settings):
         raise InvalidProblem(
             f"checkpoint {path}", expected="the same settings", got=f"another {name}", remedy=again
         )
@@ -195,15 +195,3 @@ def _log(training: Training, loss: float, watch: Watch, writer: SummaryWriter) -
     for name, value in row.items():
         if name != "iteration":
             writer.add_scalar(name, value, training.iteration)
-
-
-def _progress() -> Progress:
-    console = Console(stderr=True)
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        console=console,
-        disable=not console.is_terminal,
-    )

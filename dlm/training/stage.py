@@ -1,25 +1,11 @@
 """What one stage of training is (Thesis 4.3): its policy, loss and data, and the schedule of its steps."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 from dlm.policy import Loss, PolicyKind
 from expert.world.values import require
-
-
-@dataclass(frozen=True, kw_only=True)
-class Stage:
-    """What one stage learns by: policy, loss, data set, and the stage whose weights it starts from.
-
-    schedule: what differs from the common schedule, by the names of `Schedule`.
-    """
-
-    name: str
-    policy: PolicyKind
-    loss: Loss
-    dataset: str
-    warm_start: str | None = None
-    schedule: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,3 +25,23 @@ class Schedule:
             require(isinstance(value, int) and value >= 1, name, "a whole number >= 1", value)
         require(self.batch_size >= 2, "batch_size", "at least 2, for batch norm", self.batch_size)
         require(0 < self.learning_rate < 1, "learning_rate", "a number in (0, 1)", self.learning_rate)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """What one stage learns by: policy, loss, data set, and the stage whose weights it starts from.
+
+    schedule: what differs from the common schedule, by the names of `Schedule`.
+    """
+
+    name: str
+    policy: PolicyKind
+    loss: Loss
+    dataset: str
+    warm_start: str | None = None
+    schedule: Mapping[str, float] = field(default_factory=dict)
+
+    def scheduled(self, common: Schedule) -> Schedule:
+        """The common schedule with what this stage does otherwise.  Raises InvalidProblem for senseless values."""
+        own: dict[str, Any] = {**asdict(common), **self.schedule}
+        return Schedule(**own)

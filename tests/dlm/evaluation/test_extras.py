@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from dlm.evaluation.extras import Extra, chart, read_extras
-from dlm.evaluation.report import extra_section
+from dlm.evaluation.extras import Extra, read_extras
+from dlm.evaluation.report import template
 from expert.errors import InvalidProblem
 
 TABLE = {
@@ -22,6 +22,11 @@ CURVE = {
 }
 
 
+def section(extra: Extra) -> str:
+    """As the report shows it."""
+    return str(template("report_parts.html").module.extra_section(extra))  # type: ignore[attr-defined]
+
+
 def test_files_and_folders_of_results_are_read(tmp_path: Path) -> None:
     (tmp_path / "b.json").write_text(json.dumps(CURVE))
     (tmp_path / "a.json").write_text(json.dumps(TABLE))
@@ -29,7 +34,7 @@ def test_files_and_folders_of_results_are_read(tmp_path: Path) -> None:
 
 
 def test_a_table_is_shown_with_its_command_and_nothing_of_it_is_code() -> None:
-    shown = extra_section(Extra(**TABLE))  # type: ignore[arg-type]
+    shown = section(Extra(**TABLE))  # type: ignore[arg-type]
     assert "<td>0.0123</td>" in shown
     assert "<td>–</td>" in shown
     assert "x&lt;y" in shown
@@ -37,11 +42,11 @@ def test_a_table_is_shown_with_its_command_and_nothing_of_it_is_code() -> None:
 
 
 def test_a_chart_has_a_line_per_series_in_order_of_x() -> None:
-    figure = chart(Extra(**CURVE))  # type: ignore[arg-type]
+    figure = Extra(**CURVE).chart()  # type: ignore[arg-type]
     lines = figure.axes[0].get_lines()
     assert [line.get_label() for line in lines] == ["a", "b"]
     assert list(lines[0].get_xdata()) == [20, 200]
-    assert 'class="chart"' in extra_section(Extra(**CURVE))  # type: ignore[arg-type]
+    assert 'class="chart"' in section(Extra(**CURVE))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

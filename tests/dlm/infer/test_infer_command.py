@@ -17,7 +17,7 @@ from dlm.tasks import TaskBatch
 from dlm.thesis.derender import NetworkSizes
 from dlm.thesis.losses import ParameterLoss
 from dlm.thesis.policies import ThesisArchitecture
-from dlm.training.loop import Training
+from dlm.training.loop import Record, Training
 from dlm.training.stage import Schedule, Stage
 from expert.__main__ import main as expert
 from tests.support.clips import drawn, write_clip
@@ -46,7 +46,8 @@ def folder(tasks: TaskBatch, tmp_path_factory: pytest.TempPathFactory) -> Path:
     policy = ThesisArchitecture(sizes=small, layout=Layout()).build("perceptron", InverseDynamics(), seed=0)
     stage = Stage(name="nn", policy="perceptron", loss=ParameterLoss(), dataset="train")
     training = Training(policy, stage.loss, tasks, Schedule())
-    training.checkpoint(stage, "thesis", {}).save(folder / "thesis.safetensors")
+    record = Record(path=folder / "thesis.safetensors", stage=stage, model="thesis", settings={})
+    training.checkpoint(record).save(record.path)
     whole = (folder / "good.mp4").read_bytes()
     (folder / "cut.mp4").write_bytes(whole[: len(whole) // 2])
     return folder

@@ -17,7 +17,7 @@ from dlm.structured.weights import SHIPPED, strip, trained_model
 from dlm.tasks import TaskBatch
 from dlm.thesis.losses import ActionLoss, ParameterLoss, SimulationLoss
 from dlm.training.checkpoint import load
-from dlm.training.loop import Row, Training, Watch, fit
+from dlm.training.loop import Record, Row, Training, Watch, fit
 from dlm.training.stage import Schedule, Stage
 from expert.errors import InvalidProblem
 
@@ -47,7 +47,8 @@ def train(
         }
     )
     training = Training(SMALL.build(kind, seed=1), loss, tasks, plan)
-    fit(training, stage, path=path, model="structured", settings={}, watch=QUIET, resume=resume)
+    record = Record(path=path, stage=stage, model="structured", settings={})
+    fit(training, record, watch=QUIET, resume=resume)
     return training.history
 
 

@@ -13,7 +13,7 @@ from dlm.thesis.derender import NetworkSizes
 from dlm.thesis.losses import ParameterLoss
 from dlm.thesis.policies import ThesisArchitecture
 from dlm.training.checkpoint import load
-from dlm.training.loop import Row, Training, Watch, fit
+from dlm.training.loop import Record, Row, Training, Watch, fit
 from dlm.training.stage import Schedule, Stage
 from expert.errors import InvalidProblem, SolverFailed
 
@@ -49,7 +49,8 @@ def train(
         seed=seed, **{"iterations": 6, "batch_size": 2, "save_every": 2, "log_every": 1, **schedule}
     )
     training = Training(policy, STAGE.loss, tasks, plan)
-    fit(training, STAGE, path=path, model="thesis", settings=settings or {}, watch=watch, resume=resume)
+    record = Record(path=path, stage=STAGE, model="thesis", settings=settings or {})
+    fit(training, record, watch=watch, resume=resume)
     return training.history
 
 
