@@ -36,7 +36,8 @@ def curves_figure(histories: Histories, no_action: Mapping[str, float]) -> Figur
             ax.axhline(no_action["test"], color="0.5", lw=1, label="no action, test")
         ax.set(title=title, xlabel="iteration", ylabel="cm²", yscale="log")
         ax.grid(alpha=0.25, which="both", lw=0.5)
-        ax.legend(fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False)
+        if ax.get_lines():
+            ax.legend(fontsize=8, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False)
     return figure
 
 

@@ -12,20 +12,17 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from datasets.generation import Generation, generate
-from datasets.label import Labelling, Refusal, label
-from datasets.motions import FAMILIES, TaskSettings, sample_task
-from datasets.shapes import Shapes
-from datasets.specification import FailedDraw, Specification, draw, generator
+from datasets.motions import FAMILIES
+from datasets.specification import FailedDraw, Specification, draw
 from datasets.store import encode_shard, read_dataset, read_manifest, shard_path
-from expert.contact import solve
-from expert.errors import InvalidProblem, SolverFailed
+from expert.errors import InvalidProblem
 from expert.verify.plan.check import check_plan
 
 Contents = Callable[[Path], dict[str, bytes]]
+
 
 COMMAND = [sys.executable, "-m", "datasets.generate", "dataset=smoke"]
 
@@ -161,13 +158,6 @@ def test_families_come_in_equal_parts_and_every_label_is_sound_again_when_read_b
         assert check_plan(sample.task, sample.plan).verdict == "sound"
 
 
-def test_data_sets_of_one_seed_share_no_task(smoke: Specification) -> None:
-    first, second = (generator(name, 0, 0, 0).random(4) for name in ("train", "finetune"))
-    assert not np.allclose(first, second)
-    (a, _), (b, _) = (draw(replace(smoke, name=name), 0, 0) for name in ("train", "finetune"))
-    assert not np.array_equal(a.video, b.video)
-
-
 def test_failed_draws_are_counted_by_reason(smoke: Specification, tmp_path: Path) -> None:
     """Hardly any friction: not every lift has a plan, and the manifest says how many have none and which."""
     slippery = replace(smoke, count=4, shard=4, tasks=replace(smoke.tasks, friction=0.05))
@@ -181,51 +171,6 @@ def test_failed_draws_are_counted_by_reason(smoke: Specification, tmp_path: Path
         assert data[i].attempt == sum(f["index"] == i for f in failed)
     again, failures = draw(slippery, 0, failed[0]["index"])
     assert [vars(f) for f in failures] == [f for f in failed if f["index"] == again.index]
-
-
-def test_a_task_that_no_draw_can_label_stops_the_job(smoke: Specification) -> None:
-    one_finger = replace(smoke, tasks=replace(smoke.tasks, fingers=1))
-    with pytest.raises(SolverFailed, match=r"^task 2 \(lift\): no label in 100 draws; the last: infeasible"):
-        draw(one_finger, 0, 2)
-
-
-def test_a_spent_budget_is_no_proof_of_infeasibility() -> None:
-    task = sample_task(
-        np.random.default_rng(0), "slide_lift", Shapes(facets=(12, 12)), TaskSettings(least_push=0.0)
-    )
-    answer = label(task, Labelling(node_limit=1, gap=1e-9))
-    reason = answer.reason if isinstance(answer, Refusal) else answer.plan.status
-    assert reason in ("budget", "feasible")
-
-
-def test_the_least_push_is_given_up_only_where_no_plan_keeps_it(smoke: Specification) -> None:
-    """With fingers that may push with 0.9 to 1 m g alone, slides have plans, and some lifts need a gentler touch."""
-    strict = replace(smoke, tasks=replace(smoke.tasks, least_push=0.9, force_limit=1.0))
-    kept, given_up = [], []
-    for index in (0, 5, 6, 10):
-        sample, _ = draw(strict, 0, index)
-        assert check_plan(sample.task, sample.plan).verdict == "sound"
-        (kept if sample.task.robustness.min_normal_force > 0 else given_up).append(sample)
-    assert kept
-    assert given_up
-    for sample in given_up:
-        asked = replace(sample.task.robustness, min_normal_force=0.9 * sample.task.weight)
-        assert solve(replace(sample.task, robustness=asked)).status == "infeasible"
-
-
-def test_every_data_set_has_its_stated_size(configured: Callable[[str], Specification]) -> None:
-    sizes = {
-        name: (s.count, s.shapes.facets)
-        for name in ("train", "finetune", "test", "family", "smoke")
-        for s in [configured(name)]
-    }
-    assert sizes == {
-        "train": (20, (4, 6)),
-        "finetune": (20, (4, 6)),
-        "test": (40, (12, 12)),
-        "family": (40, (4, 6)),
-        "smoke": (4, (4, 6)),
-    }
 
 
 def test_shards_hold_no_clock(small: Specification, made: Path) -> None:

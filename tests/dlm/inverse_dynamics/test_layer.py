@@ -4,42 +4,16 @@ import pytest
 import torch
 from torch import Tensor
 
-from datasets.parameters import parameters_of
-from dlm.inverse_dynamics.data import QPSize, QPWeights
+from dlm.inverse_dynamics.data import QPSize
 from dlm.inverse_dynamics.layer import Action, InverseDynamics
-from dlm.inverse_dynamics.parameters import FLAGS, Layout, ParameterBatch
-from dlm.inverse_dynamics.problem import inverse_dynamics_problem
+from dlm.inverse_dynamics.parameters import ParameterBatch
 from dlm.tasks import TaskBatch
 from expert.errors import InvalidProblem
 from expert.problems.contact import Cost
-from tests.support.labelled import labels
+from tests.support.programs import BACKENDS, LAYOUT, score
 
-LAYOUT = Layout()
-BACKENDS = ("cvxpylayers", "batched")
 WITHIN = 1e-4
 """Bar of the equality test: positions over L, forces over m g."""
-
-
-@pytest.fixture(scope="module")
-def everyone() -> list:
-    return [*labels(6, (4, 6)), *labels(6, (12, 12))]
-
-
-@pytest.fixture(scope="module")
-def truth(everyone: list) -> ParameterBatch:
-    return ParameterBatch.stack([parameters_of(one.task, one.plan) for one in everyone])
-
-
-@pytest.fixture(scope="module")
-def generic(truth: ParameterBatch) -> Tensor:
-    """Rows (b, t, width) near the truth where the optimum is smooth: at the truth itself it can have corners."""
-    rows = LAYOUT.split(LAYOUT.flatten(truth))
-    noise = torch.Generator().manual_seed(0)
-    moved = {
-        n: 0.05 + 0.9 * x if n in FLAGS else x + 0.03 * torch.randn(x.shape, generator=noise, dtype=x.dtype)
-        for n, x in rows.items()
-    }
-    return torch.cat([x.flatten(2) for x in moved.values()], dim=-1)
 
 
 def misses(action: Action, everyone: list, truth: ParameterBatch) -> Tensor:
@@ -49,18 +23,6 @@ def misses(action: Action, everyone: list, truth: ParameterBatch) -> Tensor:
     position = (action.positions - truth.reference_positions).abs().amax(-1) * truth.contact
     force = (action.forces - truth.reference_forces).abs()
     return torch.maximum(position.amax((1, 2)) / size, force.amax((1, 2, 3)) / weight)
-
-
-def score(action: Action) -> Tensor:
-    """A smooth number per task, (b,), to differentiate."""
-    ramp = torch.linspace(-1, 1, action.positions[0].numel(), dtype=torch.float64).view(5, -1, 2)
-    return (10 * ramp * action.positions + ramp.flip(0) * action.forces).sum((1, 2, 3))
-
-
-def test_4_ct6_is_a_disciplined_parametrised_program() -> None:
-    weights = QPWeights.of(Cost(), dt=0.1, length=0.01, force=1.0, slack=1.0)
-    problem, _, _ = inverse_dynamics_problem(QPSize(), weights)
-    assert problem.is_dpp()
 
 
 @pytest.mark.parametrize("slack", [None, 300.0])
@@ -124,19 +86,6 @@ def test_gradients_agree_with_finite_differences(backend: str, generic: Tensor) 
     torch.testing.assert_close(slopes.norm(dim=0), differences.norm(dim=0), rtol=1e-2, atol=0)
 
 
-def test_two_backends_agree(generic: Tensor) -> None:
-    actions, gradients = [], []
-    for backend in BACKENDS:
-        rows = generic.clone().requires_grad_()
-        action = InverseDynamics(backend=backend)(LAYOUT.unflatten(rows))  # type: ignore[arg-type]
-        score(action).sum().backward()
-        actions.append(action)
-        gradients.append(rows.grad.flatten(1))
-    torch.testing.assert_close(actions[0].positions, actions[1].positions, rtol=0, atol=1e-5)
-    torch.testing.assert_close(actions[0].forces, actions[1].forces, rtol=0, atol=1e-3)
-    assert torch.cosine_similarity(*gradients).min() > 0.999
-
-
 def test_positions_feel_the_cones_through_the_first_order_torque_alone(generic: Tensor) -> None:
     sizes = {}
     for torque in ("first_order", "thesis"):
@@ -146,60 +95,6 @@ def test_positions_feel_the_cones_through_the_first_order_torque_alone(generic: 
         sizes[torque] = LAYOUT.split(rows.grad)["cones"].abs().amax((1, 2, 3, 4))
     assert (sizes["first_order"] > 1e-6).all()
     assert sizes["thesis"].max() < 1e-9
-
-
-def test_the_solution_obeys_4_ct6(generic: Tensor) -> None:
-    """The constraints stated a second time, in SI and with the flags' meaning at 0 and 1."""
-    rows = LAYOUT.split(generic)
-    P = LAYOUT.unflatten(
-        torch.cat([(x.round() if n in FLAGS else x).flatten(2) for n, x in rows.items()], dim=-1)
-    )
-    with torch.no_grad():
-        action = InverseDynamics(backend="batched")(P)
-    p, lam = action.positions, action.forces
-    start, edge = P.facets[..., 0, :], P.facets[..., 1, :] - P.facets[..., 0, :]
-    rho = ((p - start) * edge).sum(-1) / edge.square().sum(-1)
-    off = (p - start - rho[..., None] * edge).norm(dim=-1) * P.contact
-    assert off.max() < 1e-7
-    touching = P.contact == 1
-    assert rho[touching].min() > -1e-6
-    assert rho[touching].max() < 1 + 1e-6
-    held = (P.stick[:, :-1] == 1) & touching[:, :-1] & touching[:, 1:]
-    assert (rho[:, 1:] - rho[:, :-1])[held].abs().max() < 1e-6
-    weights = torch.linalg.solve(P.cones.transpose(-1, -2), lam[..., None])[..., 0]
-    assert weights.min() > -1e-6
-    assert lam[P.stick == 0].abs().max() < 1e-8
-    normal = weights.sum(-1)[P.stick == 1]
-    assert (normal > P.force_limits[P.stick == 1][:, 0] - 1e-6).all()
-    # Newton-Euler: what fingers and slack leave over is in the ground's cone, and nil without ground contact.
-    couple = (P.reference_positions - P.poses[:, :, None, :2]), (p - P.reference_positions)
-    torque = _cross(couple[0], lam) + _cross(couple[1], P.reference_forces)
-    wrench = torch.cat([lam.sum(2), torque.sum(2)[..., None]], dim=-1)
-    left = P.wrench - wrench - action.slack
-    airborne = (P.external_contact == 0).all(-1)
-    assert airborne.any()
-    assert left[airborne].abs().max() < 1e-6
-
-
-def _cross(u: Tensor, v: Tensor) -> Tensor:
-    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
-
-
-def test_flags_between_0_and_1_lead_from_free_to_held(truth: ParameterBatch) -> None:
-    layer = InverseDynamics(backend="batched")
-    shifted = replace(truth, facets=truth.facets + 0.01)  # the fingers would rather stay
-    distance = []
-    for share in (0.0, 0.5, 0.9, 0.99, 1.0):
-        flagged = replace(shifted, contact=share * truth.contact)
-        with torch.no_grad():
-            p = layer(flagged).positions
-        start, edge = shifted.facets[..., 0, :], shifted.facets[..., 1, :] - shifted.facets[..., 0, :]
-        rho = ((p - start) * edge).sum(-1, keepdim=True) / edge.square().sum(-1, keepdim=True)
-        distance.append(float(((p - start - rho.clamp(0, 1) * edge).norm(dim=-1) * truth.contact).mean()))
-    assert distance == sorted(distance, reverse=True)
-    assert distance[0] > 1e-3
-    assert distance[-2] < 1e-4
-    assert distance[-1] < 1e-8
 
 
 @pytest.mark.parametrize("backend", BACKENDS)

@@ -5,30 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dlm.perception.contacts import snap_contacts
 from dlm.perception.fit import (
     MovingPolygon,
-    Observation,
     calibrated,
     fit,
     modelled,
     quadratic,
     without_outliers,
 )
-from dlm.perception.prune import prune, straightness, without_tangles
-from expert.geometry.pose import rotation
-
-PENTAGON = np.array([[5.0, 6.0], [14.0, 6.0], [17.0, 11.0], [10.0, 17.0], [4.0, 12.0]])
-MOTION = np.array([[0.0, 0.0, 0.0], [0.4, 1.3, 0.2], [1.2, 2.1, 0.5]])
-TRUTH = MovingPolygon(PENTAGON, MOTION, np.array([10.0, 10.0]))
-
-
-def observed(scene: MovingPolygon, blur: float = 0.0, deviation: float = 0.01, seed: int = 0) -> Observation:
-    """What a camera with some noise sees of it."""
-    blank = np.zeros((len(scene.motion), 28, 28))
-    seen = Observation(blank, blank + deviation**-2, np.zeros((len(blank), 2)), blur)
-    share, _ = modelled(scene, seen)
-    return replace(seen, share=share + np.random.default_rng(seed).normal(0, deviation, share.shape))
+from tests.support.moving_polygon import MOTION, PENTAGON, TRUTH, observed
 
 
 def disturbed(seed: int) -> MovingPolygon:
@@ -75,31 +60,6 @@ def test_a_scene_is_the_same_whichever_step_describes_it() -> None:
     assert np.array_equal(again.motion[0], np.zeros(3))
 
 
-def test_needless_corners_go_and_needed_ones_stay() -> None:
-    middles = (PENTAGON + np.roll(PENTAGON, -1, axis=0)) / 2
-    doubled = np.stack([PENTAGON, middles], axis=1).reshape(-1, 2)
-    found, _ = prune(replace(TRUTH, vertices=doubled), observed(TRUTH))
-    assert len(found.vertices) == 5
-    assert np.abs(found.vertices - PENTAGON).max() < 0.1
-
-
-def test_straight_corners_cost_nothing_and_sharp_ones_much() -> None:
-    with_middle = np.insert(PENTAGON, 1, [9.0, 6.0], axis=0)
-    scene = replace(TRUTH, vertices=with_middle)
-    rise = straightness(scene, quadratic(scene, observed(TRUTH)))
-    assert rise.argmin() == 1
-    assert rise[1] < 1e-9
-    assert straightness(TRUTH, quadratic(TRUTH, observed(TRUTH))).min() > 100
-
-
-def test_tangles_are_cut_off() -> None:
-    loop = np.insert(PENTAGON, 2, [[18.0, 12.0], [18.0, 9.0], [15.0, 9.2]], axis=0)
-    assert len(without_tangles(loop)) < len(loop)
-    short = np.insert(PENTAGON, 1, [13.9, 6.0], axis=0)
-    assert len(without_tangles(short)) == len(PENTAGON)
-    assert np.array_equal(without_tangles(PENTAGON), PENTAGON)
-
-
 def test_what_hides_the_object_loses_its_weight() -> None:
     seen = observed(TRUTH)
     share = seen.share.copy()
@@ -116,27 +76,3 @@ def test_the_contrast_is_corrected() -> None:
     seen = observed(TRUTH)
     off = replace(seen, share=1.1 * seen.share)
     assert np.allclose(calibrated(TRUTH, off).share, seen.share, atol=2e-3)
-
-
-def test_contacts_are_exact_and_nothing_enters_the_floor() -> None:
-    """A pivot about the right end of the side at rest: it stays where it is."""
-    corner = PENTAGON[1]
-    motion = np.zeros((3, 3))
-    for t, angle in enumerate([0.0, -0.15, -0.4]):
-        shift = corner - TRUTH.centre - rotation(angle) @ (corner - TRUTH.centre)
-        motion[t] = [*shift, angle]
-    seen = observed(MovingPolygon(PENTAGON, motion, TRUTH.centre), deviation=0.03)
-    rough, _ = fit(MovingPolygon(PENTAGON + 0.05, motion, TRUTH.centre), seen)
-    found = snap_contacts(rough, seen, floor=6.0, reach=0.25).placed()
-    assert np.abs(found[0, :2, 1] - 6).max() < 1e-8
-    assert np.abs(found[:, 1] - found[0, 1]).max() < 1e-8
-    assert found[..., 1].min() > 6 - 1e-8
-    assert found[1, 0, 1] > 6.5
-
-
-def test_a_gap_that_the_data_shows_stays() -> None:
-    motion = np.array([[0.0, 0.0, 0.0], [0.0, 0.2, 0.0]])
-    seen = observed(MovingPolygon(PENTAGON, motion, TRUTH.centre))
-    found = snap_contacts(MovingPolygon(PENTAGON, motion, TRUTH.centre), seen, floor=6.0, reach=0.25).placed()
-    assert np.abs(found[0, :2, 1] - 6).max() < 1e-8
-    assert np.abs(found[1, :2, 1] - 6.2).max() < 0.03

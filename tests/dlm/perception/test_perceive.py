@@ -4,51 +4,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from datasets.disturb import DISTURBANCES, noisy, random_palette
-from datasets.motions import FAMILIES, NoRoom, sample_task
+from datasets.disturb import DISTURBANCES, noisy
+from datasets.motions import FAMILIES, sample_task
 from datasets.render import Camera, Frames, render
-from datasets.shapes import ShapeFamily, Shapes
+from datasets.shapes import Shapes
 from datasets.shapes_omnipush import OmniPush
 from datasets.specification import generator
 from dlm.perception import Perceived, PerceptionSettings, perceive
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import mass_properties, signed_area, simple_polygon
-from expert.geometry.pose import Array, to_world
+from expert.geometry.pose import to_world
 from expert.mechanics import external_contacts
 from expert.problems.contact import ContactTask
 from expert.world.motion import Trajectory
 from expert.world.shape import Body
 from tests.support.mujoco_video import mujoco_videos
-
-LEANING = np.array([[-0.03, -0.02], [0.03, -0.02], [0.04, 0.01], [-0.01, 0.035]])
-LEANING = LEANING - mass_properties(LEANING).centroid
-PATH = np.array(
-    [[-0.02, 0.06, 0.0], [-0.01, 0.08, 0.1], [0.0, 0.09, 0.2], [0.01, 0.08, 0.3], [0.02, 0.07, 0.35]]
-)
-
-
-def task_of(family: str, shapes: ShapeFamily | None = None, seed: int = 0) -> ContactTask:
-    for attempt in range(20):
-        try:
-            return sample_task(np.random.default_rng([seed, attempt]), family, shapes)
-        except NoRoom:
-            continue
-    raise AssertionError(f"20 shapes in a row without a motion of the family {family}")
-
-
-def video_of(task: ContactTask) -> Frames:
-    return render(task.body.vertices, task.trajectory.poses)
-
-
-def errors(seen: Perceived, vertices: Array, poses: Array) -> tuple[float, float, float]:
-    """Degrees, and millimetres of the centre and the outline."""
-    off = np.abs(seen.poses - poses).max(axis=0)
-    outlines = [shapely.Polygon(v).exterior for v in (vertices, seen.vertices)]
-    return np.degrees(off[2]), 1e3 * off[:2].max(), 1e3 * outlines[0].hausdorff_distance(outlines[1])
+from tests.support.videos import LEANING, PATH, errors, task_of, video_of
 
 
 def perceived_task(seen: Perceived, task: ContactTask) -> ContactTask:
@@ -109,16 +83,6 @@ def test_disturbances_cost_little(name: str) -> None:
     assert outline < 1
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_colours_may_be_any_that_differ(seed: int) -> None:
-    task = task_of("slide_lift", seed=1)
-    palette = random_palette(np.random.default_rng(seed))
-    seen = perceive(render(task.body.vertices, task.trajectory.poses, palette=palette))
-    angle, position, _ = errors(seen, task.body.vertices, task.trajectory.poses)
-    assert angle < 0.4
-    assert position < 0.15
-
-
 def test_blur_that_is_not_modelled_rounds_the_corners() -> None:
     task = task_of("lift", seed=3)
     video = DISTURBANCES["blur 1"](video_of(task), np.random.default_rng(0))
@@ -138,22 +102,6 @@ def test_objects_of_four_sides_are_seen_whether_convex_or_not() -> None:
     assert sum(poses) >= 5
 
 
-def test_turns_may_be_large_and_angles_run_on() -> None:
-    poses = PATH.copy()
-    poses[:, 2] = [0, 1.5, 3.0, 4.5, 6.0]
-    seen = perceive(render(LEANING, poses))
-    angle, position, outline = errors(seen, LEANING, poses)
-    assert angle < 0.5
-    assert position < 0.15
-    assert outline < 0.3
-
-
-def test_a_square_turns_the_shorter_way() -> None:
-    square = 0.025 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    seen = perceive(render(square, PATH))
-    assert errors(seen, square, PATH)[0] < 0.5
-
-
 def test_without_a_floor_nothing_is_snapped() -> None:
     """Seen from above: the floor's line is moved out of view."""
     camera = Camera(below=0.0)
@@ -171,16 +119,6 @@ def test_finer_cameras_see_more_exactly() -> None:
     assert angle < 0.15
     assert position < 0.06
     assert outline < 0.15
-
-
-def test_an_object_that_changes_its_shape_is_a_poor_fit() -> None:
-    video = render(LEANING, PATH)
-    video[3:] = render(LEANING * [1.0, 0.6], PATH[3:])
-    seen = perceive(video)
-    assert seen.status == "poor_fit"
-    assert "grey levels" in seen.reason
-    assert np.isfinite(seen.vertices).all()
-    assert np.isfinite(seen.poses).all()
 
 
 @pytest.mark.parametrize("perspective", [False, True])
@@ -242,17 +180,3 @@ def test_bad_videos_are_refused_in_one_line(name: str) -> None:
         perceive(video)
     assert "\n" not in str(refusal.value)
     assert refusal.value.remedy
-
-
-@pytest.mark.parametrize(
-    ("change", "field"),
-    [
-        ({"blur": -1.0}, "perception.blur"),
-        ({"most_vertices": 2}, "perception.most_vertices"),
-        ({"snap": float("nan")}, "perception.snap"),
-        ({"tolerance": 0.0}, "perception.tolerance"),
-    ],
-)
-def test_senseless_settings_are_refused_by_name(change: dict, field: str) -> None:
-    with pytest.raises(InvalidProblem, match=f"^{field}: expected "):
-        PerceptionSettings(**change)

@@ -18,8 +18,14 @@ from dlm.training.stage import Schedule, Stage
 from expert.errors import InvalidProblem, SolverFailed
 
 STAGE = Stage(name="mdr", policy="program", loss=ParameterLoss(), dataset="train")
+
+
 SMALL = NetworkSizes(channels=(2, 3, 4), latent=8, recurrent_layers=1, hidden_layers=1)
+
+
 MODEL = ThesisArchitecture(sizes=SMALL, layout=Layout())
+
+
 QUIET = Watch(measure=lambda policy: {}, picture=lambda policy: Figure(figsize=(1, 1)))
 
 
@@ -149,11 +155,3 @@ def test_batches_hold_every_task_once(tasks: TaskBatch, program: InverseDynamics
     batches = training._batches()
     assert [len(b) for b in batches] == [2, 2]
     assert sorted(torch.cat(batches).tolist()) == [0, 1, 2, 3]
-
-
-@pytest.mark.parametrize(
-    ("name", "value"), [("iterations", 0), ("batch_size", 1), ("learning_rate", -1.0), ("save_every", 0)]
-)
-def test_a_schedule_refuses_what_makes_no_sense(name: str, value: float) -> None:
-    with pytest.raises(InvalidProblem, match=f"{name}: expected"):
-        Schedule(**{name: value})
