@@ -15,6 +15,7 @@ import numpy as np
 
 from expert.geometry.polygon import facet_frames, facets, reflex_vertices, signed_distance
 from expert.geometry.pose import Array
+from expert.loops.normals import spans
 
 CLEARANCES = (0.04, 0.02, 0.01, 0.005, 0.0025)
 """Tried in this order, relative to the object's size."""
@@ -97,9 +98,7 @@ def _held(vertices: Array, centre: Array, radius: float) -> Iterator[tuple[Array
     for triple in itertools.combinations(points, 3):
         contacts = np.array(triple)
         outward = (contacts - centre) / np.linalg.norm(contacts - centre, axis=1, keepdims=True)
-        angles = np.sort(np.arctan2(outward[:, 1], outward[:, 0]))
-        gaps = np.diff(np.append(angles, angles[0] + 2 * np.pi))
-        if gaps.max() < np.pi - SPANNING:
+        if spans(outward, SPANNING):
             yield contacts, outward
 
 

@@ -4,15 +4,13 @@ import numpy as np
 
 from expert.caging.model import SweptModel
 from expert.geometry.pose import Array, rotation
-from expert.loops.swept import REACH
+from expert.loops.jaws import DIRECTIONS, circle, free_jaws, parallel_jaws
+from expert.loops.swept import FARTHEST
 from expert.mip.backends import Solver
-from expert.mip.linear import Term
 from expert.problems.cage import CageProblem
 from expert.world.fingers import Gripper
 from expert.world.frame import Frame
 
-DIRECTIONS = 16
-"""Distances are bounded in so many directions."""
 TANGENTS = 24
 """Of the square of a distance, in a geometric series."""
 GAIN = 0.01
@@ -37,80 +35,58 @@ def require(
     axis = to_relative @ np.array([np.cos(direction), np.sin(direction)])
     for gripper in problem.grippers:
         least, most = (length / frame.radius for length in gripper.opening)
-        limit = _parallel_jaws if problem.parallel else _free_jaws
-        limit(model, gripper, least, most, axis)
+        _keep_jaws(model, gripper, least, most, problem.parallel, axis)
     if problem.cost == "min_separation":
         _separation(model, problem.count, solver, best / frame.radius**2)
     if problem.cost == "max_opening":
         _opening(model, problem.count, to_relative, -best / frame.radius)
 
 
-def _parallel_jaws(model: SweptModel, gripper: Gripper, least: float, most: float, axis: Array) -> None:
-    """Jaws face each other along the axis: fingers[1] - fingers[0] = opening * axis."""
+def _keep_jaws(
+    model: SweptModel, gripper: Gripper, least: float, most: float, parallel: bool, axis: Array
+) -> None:
+    """The opening, along the axis or in any direction: then it is at least `least` in one of several."""
     a, b = (model.finger(k) for k in gripper.fingers)
-    across = np.array([-axis[1], axis[0]])
-    model.milp.equal([(across, b), (-across, a)], 0.0)
-    model.milp.at_most([(axis, b), (-axis, a)], most)
-    model.milp.at_most([(-axis, b), (axis, a)], -least)
-
-
-def _free_jaws(model: SweptModel, gripper: Gripper, least: float, most: float, axis: Array) -> None:
-    """At most `most` apart in every direction of a polygon inside the circle, at least `least` in one of them."""
-    a, b = (model.finger(k) for k in gripper.fingers)
-    u = _circle(DIRECTIONS)
-    apart = [(u, np.broadcast_to(b, u.shape)), (-u, np.broadcast_to(a, u.shape))]
-    model.milp.at_most(apart, np.full(DIRECTIONS, most * np.cos(np.pi / DIRECTIONS)))
-    if least > 0:
-        chosen = model.milp.binaries(DIRECTIONS)
-        model.milp.equal([(1.0, chosen)], 1.0)
-        big = 4 * REACH
-        negated = [(-u, np.broadcast_to(b, u.shape)), (u, np.broadcast_to(a, u.shape))]
-        model.milp.at_most([*negated, (big, chosen[:, None])], np.full(DIRECTIONS, big - least))
+    jaws = parallel_jaws(least, most, axis) if parallel else free_jaws(most, np.array([1.0, 0.0]))
+    apart = jaws.u @ (b - a)
+    model.milp.between(jaws.low, apart, jaws.high)
+    if least > 0 and not parallel:
+        chosen = model.milp.binaries(len(jaws.u))
+        big = 4 * FARTHEST
+        model.milp.add(chosen.sum(axis=0) == 1, apart >= least - big * (1 - chosen))
 
 
 def _separation(model: SweptModel, count: int, solver: Solver, best: float) -> None:
     """J1, the sum of squared distances between all fingers; for a linear solver, from below by tangents to a few per cent."""
-    pairs = [(model.finger(i), model.finger(j)) for i in range(count) for j in range(i)]
+    m = model.milp
+    gaps = [model.finger(i) - model.finger(j) for i in range(count) for j in range(i)]
     if solver != "highs":
-        model.milp.minimise([], [(1.0, a, b) for a, b in pairs])
+        for gap in gaps:
+            m.minimise_squares(1.0, gap)
         return
-    squares = model.milp.add((len(pairs),), 0.0, 8 * REACH**2)
-    lengths = model.milp.add((len(pairs),), 0.0, 3 * REACH)
-    u = _circle(DIRECTIONS)
-    at = np.geomspace(0.01, 3 * REACH, TANGENTS)
-    for k, (a, b) in enumerate(pairs):
-        apart: list[Term] = [(u, np.broadcast_to(a, u.shape)), (-u, np.broadcast_to(b, u.shape))]
-        model.milp.at_most([*apart, (-1.0, np.repeat(lengths[k], DIRECTIONS))], np.zeros(DIRECTIONS))
-        tangents: list[Term] = [
-            (2 * at, np.repeat(lengths[k], TANGENTS)),
-            (-1.0, np.repeat(squares[k], TANGENTS)),
-        ]
-        model.milp.at_most(tangents, at**2)
-    model.milp.minimise([(1.0, squares)])
+    squares = m.variables((len(gaps),), 0.0, 8 * FARTHEST**2)
+    lengths = m.variables((len(gaps),), 0.0, 3 * FARTHEST)
+    at = np.geomspace(0.01, 3 * FARTHEST, TANGENTS)
+    for k, gap in enumerate(gaps):
+        m.add(circle(DIRECTIONS) @ gap <= lengths[k], 2 * at * lengths[k] - squares[k] <= at**2)
+    m.minimise(squares)
     if np.isfinite(best):
-        model.milp.at_most([(1.0, squares)], (1 - GAIN) * best)
-
-
-def _circle(count: int) -> Array:
-    angles = 2 * np.pi * np.arange(count) / count
-    return np.column_stack([np.cos(angles), np.sin(angles)])
+        m.add(squares.sum(axis=0) <= (1 - GAIN) * best)
 
 
 def _opening(model: SweptModel, count: int, to_relative: Array, best: float) -> None:
     """J2 = -alpha: two fingers open along x, three along the tripod's directions."""
+    m = model.milp
     least = (1 + GAIN) * best if np.isfinite(best) else 0.0
-    alpha = model.milp.add((1,), min(least, 2 * REACH), 2 * REACH)
+    alpha = m.variables((1,), min(least, 2 * FARTHEST), 2 * FARTHEST)
     if count == 2:
         axis = to_relative @ np.array([1.0, 0.0])
-        ends = [(axis, model.finger(1)), (-axis, model.finger(0))]
-        model.milp.equal([*ends, (-1.0, alpha)], 0.0)
+        m.add(axis @ (model.finger(1) - model.finger(0)) == alpha[0])
     else:
-        centre = model.milp.add((2,), -REACH, REACH)
+        centre = m.variables((2,), -FARTHEST, FARTHEST)
         for k in range(3):
-            u = to_relative @ TRIPOD[k]
-            terms = [(1.0, model.finger(k)), (-1.0, centre), (-u, np.repeat(alpha, 2))]
-            model.milp.equal(terms, np.zeros(2))
-    model.milp.minimise([(-1.0, alpha)])
+            m.add(model.finger(k) == centre + to_relative @ TRIPOD[k] * alpha)
+    m.minimise(-alpha)
 
 
 def objective(problem: CageProblem, fingers: Array) -> float:

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from expert.caging.model import Element, SweptModel
+from expert.caging.model import SweptModel
+from expert.loops.model import Element
 from expert.problems.cage import CageProblem
 from expert.world.frame import Frame
 

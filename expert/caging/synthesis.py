@@ -5,12 +5,12 @@ all where walls, fixed fingers, grippers or a cost take part.
 """
 
 import itertools
-import time
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
+from expert.budget import Budget
 from expert.caging.closures import Closures, directions
 from expert.caging.immobilise import candidates
 from expert.caging.model import SweptModel
@@ -88,24 +88,22 @@ def solve(
         )
     if problem.fewest:
         return _fewest(problem, time_limit, method, solver)
-    began = time.thread_time()
-    tally = Tally(problem, began + time_limit)
+    tally = Tally(problem, Budget(time_limit))
     if method == "thesis":
         _search_slices(tally, solver)
     else:
         _search_ranges(tally, method, solver)
-    return tally.answer(time.thread_time() - began)
+    return tally.answer()
 
 
 def _fewest(problem: CageProblem, time_limit: float, method: CageMethod, solver: CageSolver) -> CageSolution:
     """The first count of fingers, from the least, for which a cage is found; each has an equal share of the time left."""
-    began = time.thread_time()
+    budget = Budget(time_limit)
     answers: dict[int, CageSolution] = {}
     for count in range(max(0, 2 - len(problem.fixed)), problem.count + 1):
-        left = max(began + time_limit - time.thread_time(), 0.0)
         answers[count] = answer = solve(
             replace(problem, count=count, fewest=False),
-            time_limit=left / (problem.count + 1 - count),
+            time_limit=budget.left / (problem.count + 1 - count),
             method=method,
             solver=solver,
         )
@@ -116,7 +114,7 @@ def _fewest(problem: CageProblem, time_limit: float, method: CageMethod, solver:
         answer,
         status="time_limit" if undecided and not answer.found else answer.status,
         reason="; ".join(f"{n} fingers: {KNOWN[other.status]}" for n, other in answers.items()),
-        seconds=time.thread_time() - began,
+        seconds=budget.spent,
         attempts=sum(other.attempts for other in answers.values()),
         refuted=sum(other.refuted for other in answers.values()),
         unconfirmed=sum(other.unconfirmed for other in answers.values()),
@@ -131,7 +129,7 @@ def _search_slices(tally: Tally, solver: CageSolver) -> None:
         raise InvalidProblem("options.method", expected="swept where the problem has " + extras, got="thesis")
     frame = Frame.of(problem.shape, problem.pose)
     for below, above in problem.rotation or THESIS_LADDER:
-        if tally.left <= 0 or tally.best.found:
+        if tally.budget.over or tally.best.found:
             return
         angles = slices(below, above, THESIS_SLICES)
         model = ThesisModel(
@@ -140,7 +138,7 @@ def _search_slices(tally: Tally, solver: CageSolver) -> None:
             angles,
             problem.count,
         )
-        tally.exhausted[below, above] = _search(tally, model, frame, tally.left, solver)
+        tally.exhausted[below, above] = _search(tally, model, frame, tally.budget.left, solver)
 
 
 def _search_ranges(tally: Tally, method: CageMethod, solver: CageSolver) -> None:
@@ -149,7 +147,7 @@ def _search_ranges(tally: Tally, method: CageMethod, solver: CageSolver) -> None
         _judge_fixed(tally)
         return
     for attempt in _attempts(tally.problem, method):
-        if tally.left <= 0 or tally.done:
+        if tally.budget.over or tally.done:
             return
         before = tally.best
         if attempt is None:
@@ -190,7 +188,7 @@ def _try_grasps(tally: Tally) -> None:
     """Cages around immobilising grasps that hold even where each finger is off by half the margin."""
     problem = tally.problem
     for fingers in _grasps(problem, np.random.default_rng(0)):
-        if tally.left <= 0 or tally.best.found:
+        if tally.budget.over or tally.best.found:
             return
         _try(tally, to_world(problem.pose, fingers), 400)
 
@@ -199,11 +197,11 @@ def _polish(tally: Tally) -> None:
     """Steps of ever smaller size to a lower cost, each to a verified cage."""
     problem, rng = tally.problem, np.random.default_rng(0)
     sizes = [share * problem.shape.size for share in STEPS]
-    while sizes and tally.left > 0:
+    while sizes and not tally.budget.over:
         before = tally.best
         for fingers in improvements(problem, before.fingers, sizes[0], rng):
             _try(tally, fingers, 150)
-            if tally.best is not before or tally.left <= 0:
+            if tally.best is not before or tally.budget.over:
                 break
         else:
             sizes.pop(0)
@@ -252,7 +250,7 @@ def _try_models(tally: Tally, attempt: Attempt, solver: CageSolver) -> None:
     for opening, (k, ring) in itertools.product(directions(problem), orders):
         alike = len(ring) == problem.count and not labelled(problem)
         for filling in hubs(len(ring), alike):
-            if tally.left <= 0 or tally.done:
+            if tally.budget.over or tally.done:
                 return
             key = (*astuple(attempt)[:-1], opening, k, filling)
             if tally.exhausted.get(key):
@@ -273,13 +271,13 @@ def _search(
     """Verify what the model proposes, and cut off what is refuted.  Whether it was proved to have no more to propose."""
     for _ in range(MOST_CUTS):
         tally.attempts += 1
-        proposal = model.propose(solver, max(min(seconds, tally.left), 0.01))
-        if proposal.fingers is None:
-            return proposal.status == "infeasible"
-        fingers = frame.world(proposal.fingers)
+        guess = model.propose(solver, min(seconds, tally.budget.left))
+        if guess.fingers is None:
+            return guess.status == "infeasible"
+        fingers = frame.world(guess.fingers)
         report = tally.judge(fingers)
         if report is not None and report.verdict == "caged":
-            tally.keep(fingers, report, proposal.meetings)
+            tally.keep(fingers, report, guess.meetings)
             return False
         model.cut_off()
     return False

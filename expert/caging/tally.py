@@ -1,8 +1,8 @@
 """What a search for a cage keeps: the best verified answer, its counts, and what is left of its time."""
 
-import time
 from dataclasses import dataclass, field, replace
 
+from expert.budget import Budget
 from expert.caging.requirements import objective
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
@@ -17,18 +17,13 @@ class Tally:
     """What happened so far, and the best verified answer."""
 
     problem: CageProblem
-    deadline: float
+    budget: Budget
     attempts: int = 0
     refuted: int = 0
     unconfirmed: int = 0
     exhausted: dict[tuple[object, ...], bool] = field(default_factory=dict)
     """Whether each model tried is proved to have no (more) solutions.  A better answer to beat does not give it any."""
     best: CageSolution = field(default_factory=lambda: CageSolution(status="none_found"))
-
-    @property
-    def left(self) -> float:
-        """Processor time that is left [s]: what is found does not depend on the machine's load."""
-        return self.deadline - time.thread_time()
 
     @property
     def done(self) -> bool:
@@ -60,11 +55,11 @@ class Tally:
         elif not self.best.found or found.objective < self.best.objective:
             self.best = found
 
-    def answer(self, seconds: float) -> CageSolution:
+    def answer(self) -> CageSolution:
         """The best verified cage, or why there is none."""
         best = self.best
         if not best.found:
-            stopped = self.left <= 0 or not all(self.exhausted.values())
+            stopped = self.budget.over or not all(self.exhausted.values())
             reason = (
                 "the time limit was reached before any cage was verified"
                 if stopped
@@ -73,7 +68,7 @@ class Tally:
             best = CageSolution(status="time_limit" if stopped else "none_found", reason=reason)
         return replace(
             best,
-            seconds=seconds,
+            seconds=self.budget.spent,
             attempts=self.attempts,
             refuted=self.refuted,
             unconfirmed=self.unconfirmed,

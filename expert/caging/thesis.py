@@ -7,7 +7,7 @@ Between a slice and a limit, and around other corners of the object, it proves n
 import cvxpy as cp
 import numpy as np
 
-from expert.caging.model import Proposal
+from expert.caging.model import Guess
 from expert.caging.thesis_blocks import (
     Variables,
     continuous_boundary,
@@ -58,21 +58,21 @@ class ThesisModel:
         self.x = Variables.of(self.object, count)
         self.blocks = blocks(self.x, self.object)
 
-    def propose(self, solver: Solver, time_limit: float) -> Proposal:
+    def propose(self, solver: Solver, seconds: float) -> Guess:
         """Fingers for which every block holds, with the loop H."""
         program = cp.Problem(cp.Minimize(0), [c for b in self.blocks for c in b.constraints])
-        result = solve_program(program, solver=solver, time_limit=time_limit)
+        result = solve_program(program, solver=solver, time_limit=seconds)
         if not result.found:
-            return Proposal(status=result.status)
+            return Guess(status=result.status)
         p, H = np.asarray(self.x.p.value), np.asarray(self.x.H.value)
         meetings = tuple(
             Meeting(element=int(n), piece=int(i), next_element=(int(n) + 1) % len(p), next_piece=int(j))
             for n, i, j in np.argwhere(H > 0.5)
         )
-        return Proposal(status=result.status, fingers=p, meetings=meetings)
+        return Guess(status=result.status, fingers=p, meetings=meetings)
 
     def cut_off(self) -> None:
-        """Never again the last proposal's loop, limit contacts and regions at the start."""
+        """Never again the last guess's loop, limit contacts and regions at the start."""
         x = self.x
         chosen = [(v, np.asarray(v.value)) for v in (x.H, x.T, x.R[self.object.start])]
         self.blocks.append(not_again(chosen))

@@ -13,7 +13,7 @@ from expert.caging.thesis_geometry import SlicedObject
 from expert.geometry.pose import Array, rotation
 from expert.mip.block import Block, implies
 
-REACH = 2.0
+FARTHEST = 2.0
 """Fingers stay within this distance of q, per coordinate: neighbours' obstacles, of radius 1, must meet."""
 BELOW_LEFTWARD, BELOW_RIGHTWARD, ABOVE, LEFT, RIGHT, UNUSED = range(6)
 """Where q is, seen from a segment of the loop; below it, the ray up from q crosses it leftward or rightward."""
@@ -47,7 +47,7 @@ class Variables:
         """Variables with their boxes: the workspace, the object's radius 1, and sums of both."""
         (S, M, R, L), N = o.shape, count
         return cls(
-            p=cp.Variable((N, 2), bounds=[-REACH, REACH], name="p"),
+            p=cp.Variable((N, 2), bounds=[-FARTHEST, FARTHEST], name="p"),
             Theta=cp.Variable(S, boolean=True, name="Theta"),
             H=cp.Variable((N, M, M), boolean=True, name="H"),
             G=cp.Variable((N, M, M), boolean=True, name="G"),
@@ -55,7 +55,7 @@ class Variables:
             F=cp.Variable((N, M, 2, 6), boolean=True, name="F"),
             T=cp.Variable((S, N, L), boolean=True, name="T"),
             x=cp.Variable((S - 1, N, 2), bounds=[-1, 1], name="x"),
-            way=cp.Variable((N, M, 3, 2), bounds=[-REACH - 1, REACH + 1], name="way"),
+            way=cp.Variable((N, M, 3, 2), bounds=[-FARTHEST - 1, FARTHEST + 1], name="way"),
             rho=cp.Variable((S, N, L), bounds=[0, 1], name="rho"),
             z=cp.Variable((S, len(o.contacts)), bounds=[0, 1], name="z"),
         )

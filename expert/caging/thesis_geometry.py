@@ -9,6 +9,7 @@ from expert.geometry.convex import free_regions
 from expert.geometry.cover import half_planes
 from expert.geometry.polygon import facet_frames, facets, reflex_vertices
 from expert.geometry.pose import Array, perpendicular
+from expert.loops.normals import rays
 from expert.loops.swept import SweptGeometry
 
 SPANNING = 0.05
@@ -40,11 +41,7 @@ def limit_contacts(vertices: Array, count: int) -> Array:
 
 def _spanning_weights(nu: Array) -> Array | None:
     """Positive w with sum 1 and w nu = 0 for two or three normals (k, 2), if there are any and they are unique."""
-    system = np.vstack([nu.T, np.ones(len(nu))])
-    if np.linalg.matrix_rank(system, tol=1e-6) < len(nu):
-        return None
-    w: Array = np.linalg.lstsq(system, np.array([0.0, 0.0, 1.0]), rcond=None)[0]
-    return w if w.min() >= SPANNING and np.abs(w @ nu).max() < 1e-6 else None
+    return next((w for w in rays(nu) if w.min() >= SPANNING), None)
 
 
 def _possible(n: tuple[int, ...], touched: tuple[int, ...], reflex: np.ndarray) -> bool:
@@ -85,7 +82,7 @@ class SlicedObject:
         piece_A, piece_b = _stacked([half_planes(piece) for piece in swept.pieces])
         regions = free_regions(vertices)
         region_A, elsewhere = _stacked([(r.A, r.b) for r in regions])
-        _, at_start = _stacked([(r.A, swept.cleared(r).b) for r in regions])
+        _, at_start = _stacked([(r.A, swept.cleared(r, clearance).b) for r in regions])
         start = int(np.flatnonzero(angles == 0)[0])
         inward, _ = facet_frames(vertices)
         reflex = reflex_vertices(vertices)

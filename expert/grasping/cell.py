@@ -14,8 +14,9 @@ from functools import cached_property
 import numpy as np
 
 from expert.geometry.pose import Array, cross
-from expert.grasping.facets import Facets, rays
+from expert.grasping.facets import Facets
 from expert.grasping.rows import Rows
+from expert.loops.normals import rays
 
 LEAST_MOMENT = 0.05
 """Moment (relative length) that each of the two rays must have at the end, in opposite senses."""

@@ -14,9 +14,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from expert.geometry.pose import Array
-from expert.grasping.facets import Facets, rays
+from expert.grasping.cell import GoalCell
 from expert.grasping.goal_cell import MIN_WEIGHT, SUM_WEIGHT
-from expert.grasping.nested import FacetGeometry, Grasp, Knot, NestedCages
+from expert.grasping.nested import FacetGeometry, NestedCages
+from expert.loops.model import Knot
 from expert.mip.backends import StandardForm
 
 
@@ -24,7 +25,7 @@ from expert.mip.backends import StandardForm
 class Topology:
     """All discrete choices of a nested-cage path, and the attraction alpha (4,) that its two end knots allow."""
 
-    grasp: Grasp
+    grasp: GoalCell
     hubs: tuple[int, int]
     meetings: tuple[tuple[int, int], ...]
     pairs: tuple[tuple[int, int], ...]
@@ -33,10 +34,10 @@ class Topology:
 
 
 def topologies(
-    geometry: FacetGeometry, grasp: Grasp, knots: Sequence[Knot], seconds: float
+    geometry: FacetGeometry, grasp: GoalCell, knots: Sequence[Knot], seconds: float
 ) -> Iterator[Topology]:
     """For each filling the topology of the largest start, where the end knots of the grasp exist at all."""
-    for hubs in fillings(geometry.table, grasp):
+    for hubs in fillings(grasp):
         model = NestedCages(geometry, [grasp], [knots[0], knots[-1]], hubs=hubs)
         if not model.feasible:
             return
@@ -46,15 +47,14 @@ def topologies(
             yield topology_of(model, x)
 
 
-def fillings(table: Facets, grasp: Grasp) -> list[tuple[int, int]]:
+def fillings(grasp: GoalCell) -> list[tuple[int, int]]:
     """Ways to fill the loop below and above the goal that agree with the rays which shut it there.
 
     The diagonal of a square of fingers must leave a ray's three fingers in one triangle, and join a ray's two.
     """
-    if len(grasp.facets) == 3:
+    if grasp.count == 3:
         return [(0, 0)]
-    weights = rays(table.normals[list(grasp.facets)])
-    return list(itertools.product(_hubs(weights[grasp.down]), _hubs(weights[grasp.up])))
+    return list(itertools.product(_hubs(grasp.rays[grasp.down]), _hubs(grasp.rays[grasp.up])))
 
 
 def _hubs(ray: Array) -> list[int]:
@@ -67,12 +67,12 @@ def _hubs(ray: Array) -> list[int]:
 
 def topology_of(model: NestedCages, x: Array) -> Topology:
     """The discrete choices of a solution."""
-    alpha = x[model.alpha]
+    alpha = model.alpha.at(x)
     return Topology(
-        grasp=model.grasps[int(x[model.z].argmax())],
+        grasp=model.grasps[int(model.z.at(x).argmax())],
         hubs=model.hubs,
-        meetings=tuple(model.keys[int(k)] for k in x[model.H].argmax(axis=1)),
-        pairs=tuple(model.pairs[int(k)] for k in x[model.W].sum(axis=1).argmax(axis=1)),
+        meetings=tuple(model.keys[int(k)] for k in model.H.at(x).argmax(axis=1)),
+        pairs=tuple(model.pairs[int(k)] for k in model.W.at(x).sum(axis=1).argmax(axis=1)),
         alpha=alpha,
         value=float(MIN_WEIGHT * alpha.min() + SUM_WEIGHT * alpha.sum()),
     )
@@ -88,7 +88,7 @@ def path_of(
     model.fix(topology.meetings, topology.pairs)
     finish(model)
     x = solve_convex(model.milp.form())
-    return None if x is None else x[model.p]
+    return None if x is None else model.p.at(x)
 
 
 def smooth_path(
@@ -97,7 +97,7 @@ def smooth_path(
     """Smoothest path of a topology that keeps this share of its region of attraction."""
 
     def finish(model: NestedCages) -> None:
-        model.milp.at_most([(-1.0, model.alpha)], -share * topology.alpha)
+        model.milp.add(model.alpha >= share * topology.alpha)
         model.minimise_acceleration()
 
     return path_of(geometry, topology, knots, finish)

@@ -10,10 +10,8 @@ import shapely
 
 from expert.geometry.convex import Region
 from expert.geometry.polygon import facet_frames, facets
-from expert.geometry.pose import Array, cross
-
-PARALLEL = 1e-6
-"""Normals whose cross product is smaller have one direction."""
+from expert.geometry.pose import Array
+from expert.loops.normals import same_direction, spans
 
 
 @dataclass(frozen=True)
@@ -69,50 +67,17 @@ class Facets:
         """
         groups: list[list[int]] = []
         for k, facet in enumerate(chosen):
-            alike = groups and _same(self.normals[chosen[groups[-1][0]]], self.normals[facet])
+            alike = groups and same_direction(self.normals[chosen[groups[-1][0]]], self.normals[facet])
             if alike:
                 groups[-1].append(k)
             else:
                 groups.append([k])
-        if len(groups) > 1 and _same(self.normals[chosen[groups[0][0]]], self.normals[chosen[groups[-1][0]]]):
+        if len(groups) > 1 and same_direction(
+            self.normals[chosen[groups[0][0]]], self.normals[chosen[groups[-1][0]]]
+        ):
             groups[0] = groups.pop() + groups[0]
         following = groups[1:] + groups[:1]
         return [pair for a, b in zip(groups, following, strict=True) for pair in itertools.product(a, b)]
-
-
-def _same(u: Array, v: Array) -> bool:
-    return bool(abs(cross(u, v)) < PARALLEL and u @ v > 0)
-
-
-def rays(normals: Array) -> Array:
-    """Extreme rays (k, N), each of sum 1, of {lambda >= 0 : sum lambda n = 0}; normals (N, 2).
-
-    Two antiparallel normals, or three that positively span the plane.
-    """
-    count = len(normals)
-    found = []
-    for i, j in itertools.combinations(range(count), 2):
-        if _same(normals[i], -normals[j]):
-            found.append(_ray(count, (i, j), np.ones(2)))
-    for support in itertools.combinations(range(count), 3):
-        u, v, w = normals[list(support)]
-        weights = np.array([cross(v, w), cross(w, u), cross(u, v)])
-        if (weights > PARALLEL).all() or (weights < -PARALLEL).all():
-            found.append(_ray(count, support, weights))
-    return np.array(found).reshape(-1, count)
-
-
-def _ray(count: int, support: tuple[int, ...], weights: Array) -> Array:
-    ray = np.zeros(count)
-    ray[list(support)] = weights / weights.sum()
-    return ray
-
-
-def spans(normals: Array) -> bool:
-    """Whether the normals positively span the plane, with no gap of half a turn or more between neighbours."""
-    angles = np.sort(np.arctan2(normals[:, 1], normals[:, 0]))
-    gaps = np.diff(np.append(angles, angles[0] + 2 * np.pi))
-    return bool(gaps.max() < np.pi - PARALLEL)
 
 
 def tuples(table: Facets, count: int) -> Iterator[tuple[int, ...]]:

@@ -10,12 +10,12 @@ from expert.geometry.cover import clip
 from expert.geometry.polygon import signed_area
 from expert.geometry.pose import Array
 from expert.grasping.cell import LEAST_MOMENT, GoalCell
-from expert.grasping.facets import Facets, rays, tuples
+from expert.grasping.facets import Facets, tuples
 from expert.grasping.rows import Rows
+from expert.loops.normals import rays
+from expert.loops.swept import FARTHEST
 from expert.mip.backends import Answer, StandardForm, highs
 
-REACH = 4.0
-"""Fingers stay within this distance (in enclosing radii) of the goal, per coordinate."""
 DIRECTIONS = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
 """r_h of 5-CT16."""
 MIN_WEIGHT, SUM_WEIGHT = 0.5, 0.125
@@ -80,7 +80,7 @@ def solve_rows(rows: Rows, extra: int, cost: Array, more: Array, more_low: Array
     norms = np.maximum(np.abs(A).max(axis=1, initial=1e-12), 1e-12)
     low = np.concatenate([rows.low, more_low]) / norms
     high = np.concatenate([rows.high, np.full(len(more_low), np.inf)]) / norms
-    box = np.concatenate([np.full(n - extra, REACH), np.full(extra, 2 * REACH)])
+    box = np.concatenate([np.full(n - extra, FARTHEST), np.full(extra, 2 * FARTHEST)])
     form = StandardForm(
         P=sp.coo_array((n, n)),
         q=cost,
@@ -192,5 +192,5 @@ def candidate(cell: GoalCell, half_ranges: Array) -> Candidate | None:
 def region(cell: GoalCell, p: Array) -> Array:
     """Polygon (M, 2) of translations at the goal's angle that the cell holds, fingers p (N, 2)."""
     A, b = cell.slice(p)
-    square = 2 * REACH * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    square = 2 * FARTHEST * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     return clip(square, A, b)

@@ -4,11 +4,10 @@ import itertools
 
 import numpy as np
 
-from expert.caging.requirements import DIRECTIONS
 from expert.geometry.pose import Array, rotation
 from expert.grasping.rows import Rows
+from expert.loops.jaws import free_jaws, parallel_jaws
 from expert.problems.grasp import GraspProblem
-from expert.world.fingers import Gripper
 from expert.world.frame import Frame
 
 Places = tuple[int, ...]
@@ -34,32 +33,13 @@ def jaws(problem: GraspProblem, frame: Frame, places: Places, towards: Array) ->
     parts = [Rows(np.empty((0, count, 2)), np.empty(0), np.empty(0))]
     for gripper in problem.grippers:
         i, j = (places[f] for f in gripper.fingers)
+        least, most = (length / frame.radius for length in gripper.opening)
         if problem.parallel:
-            axis = rotation(-problem.pose[2]) @ np.array([1.0, 0.0])
-            parts.append(_parallel(count, i, j, axis, gripper, frame.radius))
+            limits = parallel_jaws(least, most, rotation(-problem.pose[2]) @ np.array([1.0, 0.0]))
         else:
-            parts.append(_free(count, i, j, towards[j] - towards[i], gripper, frame.radius))
+            limits = free_jaws(most, towards[j] - towards[i])
+            limits.low[0] = least
+        V = np.zeros((len(limits.u), count, 2))
+        V[:, i], V[:, j] = -limits.u, limits.u
+        parts.append(Rows(V, limits.low, limits.high))
     return Rows.join(parts)
-
-
-def _between(count: int, i: int, j: int, directions: Array, low: Array, high: Array) -> Rows:
-    """low <= u . (p_j - p_i) <= high for directions u (m, 2)."""
-    V = np.zeros((len(directions), count, 2))
-    V[:, i], V[:, j] = -directions, directions
-    return Rows(V, low, high)
-
-
-def _parallel(count: int, i: int, j: int, axis: Array, gripper: Gripper, radius: float) -> Rows:
-    """p_j - p_i = opening * axis."""
-    least, most = (length / radius for length in gripper.opening)
-    across = np.array([-axis[1], axis[0]])
-    return _between(count, i, j, np.stack([axis, across]), np.array([least, 0.0]), np.array([most, 0.0]))
-
-
-def _free(count: int, i: int, j: int, along: Array, gripper: Gripper, radius: float) -> Rows:
-    """At most `most` apart in the directions of a polygon, at least `least` along the given one."""
-    least, most = (length / radius for length in gripper.opening)
-    angles = np.arctan2(along[1], along[0]) + 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    u = np.column_stack([np.cos(angles), np.sin(angles)])
-    low = np.where(np.arange(DIRECTIONS) == 0, least, -np.inf)
-    return _between(count, i, j, u, low, np.full(DIRECTIONS, most * np.cos(np.pi / DIRECTIONS)))

@@ -1,13 +1,13 @@
 """Finger paths worth checking, the most promising first: what each method offers to `expert.grasping.synthesis`."""
 
 import itertools
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from expert.budget import Budget
 from expert.errors import InvalidProblem, SolverFailed
 from expert.geometry.polygon import signed_area
 from expert.geometry.pose import Array
@@ -16,7 +16,6 @@ from expert.grasping.decomposed import smooth_path, topologies
 from expert.grasping.facets import Facets
 from expert.grasping.goal_cell import (
     DIRECTIONS,
-    REACH,
     Candidate,
     can_end,
     candidate,
@@ -26,9 +25,10 @@ from expert.grasping.goal_cell import (
     region,
 )
 from expert.grasping.gripper import Places, jaws, placements
-from expert.grasping.nested import FacetGeometry, Grasp, schedule
+from expert.grasping.nested import FacetGeometry, schedule
 from expert.grasping.smooth import acceleration, smoothest
 from expert.grasping.thesis import Name, solutions
+from expert.loops.swept import FARTHEST
 from expert.problems.grasp import GraspProblem
 from expert.world.frame import Frame
 
@@ -65,11 +65,11 @@ class Proposal:
 
 
 @dataclass(frozen=True)
-class Search:
-    """The problem in relative lengths, and when to stop."""
+class RelativeProblem:
+    """The problem in relative lengths, and what may be spent on it."""
 
     problem: GraspProblem
-    deadline: float
+    budget: Budget
 
     @cached_property
     def frame(self) -> Frame:
@@ -85,11 +85,6 @@ class Search:
     def margin(self) -> float:
         """The problem's margin, relative to the enclosing radius."""
         return self.problem.margin * self.problem.shape.size / self.frame.radius
-
-    @property
-    def left(self) -> float:
-        """Time that is left [s]."""
-        return self.deadline - time.perf_counter()
 
     @property
     def by_acceleration(self) -> bool:
@@ -111,30 +106,30 @@ class Search:
                 yield labelled, places
 
 
-def goal_cells(search: Search) -> Iterator[Proposal]:
+def goal_cells(task: RelativeProblem) -> Iterator[Proposal]:
     """Goal cells in the order of the area of their start, or of their smoothness."""
     found: list[tuple[Candidate, Places]] = []
-    for cell, places in search.cells():
-        if search.left <= 0:
+    for cell, places in task.cells():
+        if task.budget.over:
             break
-        known = candidate(cell, search.problem.half_ranges)
+        known = candidate(cell, task.problem.half_ranges)
         if known is not None:
             found.append((known, places))
     found.sort(key=lambda entry: -entry[0].attraction)
-    if search.by_acceleration:
-        smooth = [p for entry in found if (p := _path_of_cell(search, *entry))]
+    if task.by_acceleration:
+        smooth = [p for entry in found if (p := _path_of_cell(task, *entry))]
         yield from sorted(smooth, key=lambda p: acceleration(p.path))
         return
-    for entries in (_enlarged(search, found[:ENLARGED]), found[ENLARGED:]):
+    for entries in (_enlarged(task, found[:ENLARGED]), found[ENLARGED:]):
         for entry in entries:
-            proposal = _path_of_cell(search, *entry)
+            proposal = _path_of_cell(task, *entry)
             if proposal is not None:
                 yield proposal
 
 
-def _enlarged(search: Search, found: list[tuple[Candidate, Places]]) -> list[tuple[Candidate, Places]]:
+def _enlarged(task: RelativeProblem, found: list[tuple[Candidate, Places]]) -> list[tuple[Candidate, Places]]:
     """The same cells with the start of largest area, the largest first."""
-    first = search.problem.half_ranges[0]
+    first = task.problem.half_ranges[0]
     sized = []
     for known, places in found:
         area, start = largest_start(known.cell, known.cell.knot(first, first), known.start)
@@ -143,13 +138,13 @@ def _enlarged(search: Search, found: list[tuple[Candidate, Places]]) -> list[tup
     return [(known, places) for _, known, places in sized]
 
 
-def _path_of_cell(search: Search, known: Candidate, places: Places) -> Proposal | None:
-    ranges, cell = search.problem.half_ranges, known.cell
+def _path_of_cell(task: RelativeProblem, known: Candidate, places: Places) -> Proposal | None:
+    ranges, cell = task.problem.half_ranges, known.cell
     reaches = np.concatenate([ranges[:1], ranges[:-2]])
     knots = [cell.knot(reach, limit) for reach, limit in zip(reaches, ranges[:-1], strict=True)]
     end = cell.end(ranges[-2], FIRMNESS * known.firmest)
     try:
-        path = smoothest([*knots, end], None if search.by_acceleration else known.start)
+        path = smoothest([*knots, end], None if task.by_acceleration else known.start)
     except SolverFailed:  # says nothing about this cell; the next one is as good
         return None
     if path is None:
@@ -157,54 +152,53 @@ def _path_of_cell(search: Search, known: Candidate, places: Places) -> Proposal 
     return Proposal(path, cell.chosen, region(cell, path[0]), "goal_cell").labelled(places)
 
 
-def decomposed(search: Search) -> Iterator[Proposal]:
+def decomposed(task: RelativeProblem) -> Iterator[Proposal]:
     """Nested cages over ranked final grasps, a few at a time, each answer also with smaller starts."""
-    ranked = list(search.cells())
-    geometry = FacetGeometry(search.table.vertices, search.margin)
-    knots = schedule(search.problem.half_ranges, search.margin)
+    ranked = list(task.cells())
+    geometry = FacetGeometry(task.table.vertices, task.margin)
+    knots = schedule(task.problem.half_ranges, task.margin)
     for first in range(0, len(ranked), BATCH):
         found = []
         for cell, places in ranked[first : first + BATCH]:
-            grasp = Grasp(cell.chosen, cell.up, cell.down, cell.jaws)
-            for topology in topologies(geometry, grasp, knots, MIP_SECONDS):
+            for topology in topologies(geometry, cell, knots, MIP_SECONDS):
                 found.append((topology, places))
-            if search.left <= 0:
+            if task.budget.over:
                 break
         found.sort(key=lambda entry: -entry[0].value)
         for (topology, places), share in itertools.product(found, SHARES):
-            if search.left <= 0:
+            if task.budget.over:
                 return
             path = smooth_path(geometry, topology, knots, share)
             if path is not None:
-                starts = _free_region(search, topology.grasp.facets, path[0])
-                yield Proposal(path, topology.grasp.facets, starts, "decomposed").labelled(places)
+                starts = _free_region(task, topology.grasp.chosen, path[0])
+                yield Proposal(path, topology.grasp.chosen, starts, "decomposed").labelled(places)
 
 
-def thesis(search: Search, name: Name) -> Iterator[Proposal]:
+def thesis(task: RelativeProblem, name: Name) -> Iterator[Proposal]:
     """MIQP1 or MIQP2, each answer cut off in turn."""
-    if search.problem.grippers:
+    if task.problem.grippers:
         what = "a problem without grippers"
         remedy = "method: goal_cell or decomposed"
         raise InvalidProblem("method", expected=what, got=f"{name} with grippers", remedy=remedy)
-    grasps = [Grasp(cell.chosen, cell.up, cell.down) for cell, _ in search.cells()]
+    grasps = [cell for cell, _ in task.cells()]
     if not grasps:
         return
-    geometry = FacetGeometry(search.table.vertices, search.margin)
-    knots = schedule(search.problem.half_ranges, search.margin)
-    for topology, path in solutions(geometry, grasps, knots, name, PROGRAM_SHARE * search.left):
-        facets = topology.grasp.facets
-        yield Proposal(path, facets, _free_region(search, facets, path[0]), name)
-        if search.left <= 0:
+    geometry = FacetGeometry(task.table.vertices, task.margin)
+    knots = schedule(task.problem.half_ranges, task.margin)
+    for topology, path in solutions(geometry, grasps, knots, name, PROGRAM_SHARE * task.budget.left):
+        facets = topology.grasp.chosen
+        yield Proposal(path, facets, _free_region(task, facets, path[0]), name)
+        if task.budget.over:
             return
 
 
-def _free_region(search: Search, facets: tuple[int, ...], p: Array) -> Array:
+def _free_region(task: RelativeProblem, facets: tuple[int, ...], p: Array) -> Array:
     """Translations r_h alpha_h (H, 2), alpha_h as large as 5-CT16 allows for fingers p (N, 2) over their facets."""
-    alpha = np.full(len(DIRECTIONS), REACH)
+    alpha = np.full(len(DIRECTIONS), FARTHEST)
     for f, finger in zip(facets, p, strict=True):
-        region = search.table.beyond(f)
+        region = task.table.beyond(f)
         room, speed = region.b - region.A @ finger, -region.A @ DIRECTIONS.T
         with np.errstate(divide="ignore"):
-            limits = np.where(speed > 1e-9, room[:, None] / np.maximum(speed, 1e-9), REACH)
+            limits = np.where(speed > 1e-9, room[:, None] / np.maximum(speed, 1e-9), FARTHEST)
         alpha = np.minimum(alpha, limits.min(axis=0))
     return np.maximum(alpha, 0.0)[:, None] * DIRECTIONS

@@ -1,12 +1,14 @@
 """The sweeping process of one object and its fingers, compiled: see `expert.grasping.sweeping` for the law."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
 from expert.numeric.least_norm import least_norm
 
-REACH = 4e-3
-"""Facets this near to a finger take part in a step; no step moves object and finger nearer by more."""
+NEARBY = 4e-3
+"""Facets this near to a finger, over the object's diameter, take part in a step; none moves the two nearer by more."""
 QUICK, SHORT = 5.0, 0.1
 """A step is taken if the object moves at most QUICK times as far as the fingers, or by at most SHORT * STEP."""
 STALL = 1e-10
@@ -15,70 +17,91 @@ FREE = 1e-9
 """Depth to which fingers may be inside at the start."""
 ACCURACY = 1e-12
 """Depth to which fingers may be inside after a step."""
-CONTACTS, ITERATIONS = 8, 12
+ITERATIONS = 12
+
+
+FACET = np.dtype(
+    [(name, np.float64) for name in ("x", "y", "nx", "ny", "tx", "ty", "length")] + [("reflex", np.bool_)]
+)
+"""A facet of the object: where it starts, outward normal, tangent, length, and whether it starts at a reflex corner."""
+
+
+class Law(NamedTuple):
+    """What moves whom: finger path (K, N, 2), the object's facets (V,), its metric's root W (3, 3) and radius, and the longest step."""
+
+    path: np.ndarray
+    facets: np.ndarray
+    W: np.ndarray
+    radius: float
+    step: float
+
+
+class Step(NamedTuple):
+    """Room for one step: fingers (N, 2), contacts `which` (C, 2) of finger and facet, their gaps g (C,) and gradients A (C, 3),
+    the pose tried q (3,), and the twist u (3,) that leads there, A u >= b.
+    """
+
+    fingers: np.ndarray
+    which: np.ndarray
+    g: np.ndarray
+    A: np.ndarray
+    b: np.ndarray
+    u: np.ndarray
+    q: np.ndarray
 
 
 @njit(cache=True, error_model="numpy")
-def sweep_all(
-    facets: np.ndarray,
-    path: np.ndarray,
-    starts: np.ndarray,
-    times: np.ndarray,
-    W: np.ndarray,
-    radius: float,
-    step: float,
-) -> tuple[np.ndarray, np.ndarray]:
+def sweep_all(law: Law, starts: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Poses (M, S, 3) at the given times, and times of stalls (M,): nan for none, -1 for a start that is not free."""
     M, S = len(starts), len(times)
-    poses, stalled, q = np.empty((M, S, 3)), np.empty(M), np.empty(3)
+    poses, stalled = np.empty((M, S, 3)), np.empty(M)
     for i in range(M):
-        q[0], q[1], q[2] = starts[i, 0], starts[i, 1], starts[i, 2]
-        stalled[i] = _sweep_one(facets, path, q, times, W, radius, step, poses[i])
+        stalled[i] = _sweep_one(law, starts[i].copy(), times, poses[i])
     return poses, stalled
 
 
 @njit(cache=True, error_model="numpy")
-def _sweep_one(
-    facets: np.ndarray,
-    path: np.ndarray,
-    q: np.ndarray,
-    times: np.ndarray,
-    W: np.ndarray,
-    radius: float,
-    step: float,
-    poses: np.ndarray,
-) -> float:
+def _sweep_one(law: Law, q: np.ndarray, times: np.ndarray, poses: np.ndarray) -> float:
     """Record one execution from pose q, which is carried along, and return the time of its stall."""
-    A, g, which = np.empty((CONTACTS, 3)), np.empty(CONTACTS), np.empty((CONTACTS, 2), np.int64)
-    fingers, trial, u = np.empty((path.shape[1], 2)), np.empty(3), np.empty(3)
-    _place(path, 0.0, 0, fingers)
-    _record(poses, 0, q)
-    if _depth(facets, fingers, q) > FREE:
+    N = law.path.shape[1]
+    most = N * len(law.facets)
+    g, A, b = np.empty(most), np.empty((most, 3)), np.empty(most)
+    room = Step(np.empty((N, 2)), np.empty((most, 2), np.int64), g, A, b, np.empty(3), np.empty(3))
+    _place(law.path, 0.0, 0, room.fingers)
+    poses[:] = q
+    if _depth(law.facets, room.fingers, q) > FREE:
         return -1.0
-    s, stride = 0.0, step
+    s, stride = 0.0, law.step
     for k in range(1, len(times)):
         while s < times[k]:
-            segment = min(int(s), len(path) - 2)
-            speed = _speed(path, segment)
+            segment = min(int(s), len(law.path) - 2)
+            speed = _speed(law.path, segment)
             after = min(s + stride / speed, times[k]) if speed > 0 else times[k]
             motion = (after - s) * speed
-            _place(path, after, segment, fingers)
-            for d in range(3):
-                trial[d] = q[d]
-            ok = _project(facets, fingers, trial, W, A, g, which, u)
-            moved = np.hypot(trial[0] - q[0], trial[1] - q[1]) + radius * abs(trial[2] - q[2])
-            if ok and moved <= max(QUICK * motion, SHORT * step):
-                for d in range(3):
-                    q[d] = trial[d]
-                s = after
-                stride = min(step, 1.6 * stride)
+            _place(law.path, after, segment, room.fingers)
+            if _moves_on(law, room, q, motion):
+                s, stride = after, min(law.step, 1.6 * stride)
                 continue
             stride = 0.5 * motion
             if stride < STALL:
-                _record(poses, k, q)
+                poses[k:] = q
                 return s
-        _record(poses, k, q)
+        poses[k:] = q
     return np.nan
+
+
+@njit(cache=True, error_model="numpy")
+def _moves_on(law: Law, room: Step, q: np.ndarray, motion: float) -> bool:
+    """Move q to the nearest free pose, if there is one that fingers which moved by so much can push the object to."""
+    trial = room.q
+    trial[:] = q
+    if not _project(law, room):
+        return False
+    moved = np.hypot(trial[0] - q[0], trial[1] - q[1]) + law.radius * abs(trial[2] - q[2])
+    if moved > max(QUICK * motion, SHORT * law.step):
+        return False
+    q[:] = trial
+    return True
 
 
 @njit(cache=True, error_model="numpy")
@@ -88,14 +111,6 @@ def _place(path: np.ndarray, s: float, segment: int, fingers: np.ndarray) -> Non
     for n in range(len(fingers)):
         for d in range(2):
             fingers[n, d] = (1 - share) * path[segment, n, d] + share * path[segment + 1, n, d]
-
-
-@njit(cache=True, error_model="numpy")
-def _record(poses: np.ndarray, first: int, q: np.ndarray) -> None:
-    """Pose q from sample `first` on."""
-    for k in range(first, len(poses)):
-        for d in range(3):
-            poses[k, d] = q[d]
 
 
 @njit(cache=True, error_model="numpy")
@@ -110,33 +125,24 @@ def _speed(path: np.ndarray, segment: int) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _project(
-    facets: np.ndarray,
-    fingers: np.ndarray,
-    q: np.ndarray,
-    W: np.ndarray,
-    A: np.ndarray,
-    g: np.ndarray,
-    which: np.ndarray,
-    u: np.ndarray,
-) -> bool:
-    """Move q to the nearest free pose, by successive linearisation; False where there is none nearby.
+def _project(law: Law, room: Step) -> bool:
+    """Move room.q to the nearest free pose, by successive linearisation; False where there is none nearby.
 
     u: body twist times the metric's root.  After a few rounds facets stay chosen, which ends a flutter at a convex corner.
     """
-    cs, sn = np.cos(q[2]), np.sin(q[2])
+    W, A, b, u, q = law.W, room.A, room.b, room.u, room.q
     x, y, angle = q[0], q[1], q[2]
+    cs, sn = np.cos(angle), np.sin(angle)
     u[:] = 0
-    b = np.empty(CONTACTS)
     change, count = 0.0, 0
     for iteration in range(ITERATIONS):
         if iteration < ITERATIONS // 2:
-            count = _choose(facets, fingers, q, which)
-        worst = _linearise(facets, fingers, q, cs, sn, W, which, count, A, g)
+            count = _choose(law.facets, room)
+        worst = _linearise(law, room, angle, count)
         if worst >= -ACCURACY and change <= 1e-8:
             return True
         for k in range(count):
-            b[k] = A[k, 0] * u[0] + A[k, 1] * u[1] + A[k, 2] * u[2] - g[k]
+            b[k] = A[k, 0] * u[0] + A[k, 1] * u[1] + A[k, 2] * u[2] - room.g[k]
         before0, before1, before2 = u[0], u[1], u[2]
         if not least_norm(A, b, count, u):
             return False
@@ -144,70 +150,65 @@ def _project(
         v0 = W[0, 0] * u[0] + W[1, 0] * u[1] + W[2, 0] * u[2]
         v1 = W[0, 1] * u[0] + W[1, 1] * u[1] + W[2, 1] * u[2]
         turn = W[0, 2] * u[0] + W[1, 2] * u[1] + W[2, 2] * u[2]
-        if abs(v0) + abs(v1) + abs(turn) > 0.5 * REACH:
+        if abs(v0) + abs(v1) + abs(turn) > 0.5 * NEARBY:
             return False
         q[0], q[1], q[2] = x + cs * v0 - sn * v1, y + sn * v0 + cs * v1, angle + turn
     return False
 
 
 @njit(cache=True, error_model="numpy")
-def _choose(facets: np.ndarray, fingers: np.ndarray, q: np.ndarray, which: np.ndarray) -> int:
-    """Fill which (CONTACTS, 2) with (finger, facet) whose half-planes bound the free poses nearby; return their number."""
+def _choose(facets: np.ndarray, room: Step) -> int:
+    """Fill room.which with (finger, facet) whose half-planes bound the free poses nearby; return their number."""
+    q = room.q
     cs, sn = np.cos(q[2]), np.sin(q[2])
     V, count = len(facets), 0
-    for n in range(len(fingers)):
-        dx, dy = fingers[n, 0] - q[0], fingers[n, 1] - q[1]
-        bx, by = cs * dx + sn * dy, cs * dy - sn * dx
+    for n in range(len(room.fingers)):
+        dx, dy = room.fingers[n, 0] - q[0], room.fingers[n, 1] - q[1]
+        x, y = cs * dx + sn * dy, cs * dy - sn * dx
         for f in range(V):
-            gap = _height(facets, f, bx, by)
-            along = (bx - facets[f, 0]) * facets[f, 4] + (by - facets[f, 1]) * facets[f, 5]
-            if abs(gap) > REACH or along < -REACH or along > facets[f, 6] + REACH:
+            gap, along = _height(facets, f, x, y), _along(facets, f, x, y)
+            if abs(gap) > NEARBY or along < -NEARBY or along > facets[f].length + NEARBY:
                 continue
             before, after = (f - 1) % V, (f + 1) % V
             # At a convex corner it is enough to be outside of one facet: keep the one that is farther.
-            if facets[f, 7] == 0 and _height(facets, before, bx, by) >= gap:
+            if not facets[f].reflex and _height(facets, before, x, y) >= gap:
                 continue
-            if facets[after, 7] == 0 and _height(facets, after, bx, by) > gap:
+            if not facets[after].reflex and _height(facets, after, x, y) > gap:
                 continue
-            if count < CONTACTS:
-                which[count, 0], which[count, 1] = n, f
-                count += 1
+            room.which[count, 0], room.which[count, 1] = n, f
+            count += 1
     return count
 
 
 @njit(cache=True, error_model="numpy")
 def _height(facets: np.ndarray, f: int, x: float, y: float) -> float:
     """Signed distance of a body point from the line of a facet."""
-    return (x - facets[f, 0]) * facets[f, 2] + (y - facets[f, 1]) * facets[f, 3]
+    return (x - facets[f].x) * facets[f].nx + (y - facets[f].y) * facets[f].ny
 
 
 @njit(cache=True, error_model="numpy")
-def _linearise(
-    facets: np.ndarray,
-    fingers: np.ndarray,
-    q: np.ndarray,
-    cs: float,
-    sn: float,
-    W: np.ndarray,
-    which: np.ndarray,
-    count: int,
-    A: np.ndarray,
-    g: np.ndarray,
-) -> float:
-    """Gaps g and their gradients A by u, about pose q; (cs, sn) is the body frame of twists.  Returns the smallest gap."""
-    c, s = np.cos(q[2]), np.sin(q[2])
+def _along(facets: np.ndarray, f: int, x: float, y: float) -> float:
+    """Distance of a body point from the start of a facet, along it."""
+    return (x - facets[f].x) * facets[f].tx + (y - facets[f].y) * facets[f].ty
+
+
+@njit(cache=True, error_model="numpy")
+def _linearise(law: Law, room: Step, angle: float, count: int) -> float:
+    """Fill gaps g and their gradients A by u, about room.q; twists are in a frame at `angle`.  Returns the smallest gap."""
+    q = room.q
+    c, s, cs, sn = np.cos(q[2]), np.sin(q[2]), np.cos(angle), np.sin(angle)
     worst = np.inf
     for k in range(count):
-        n, f = which[k, 0], which[k, 1]
-        dx, dy = fingers[n, 0] - q[0], fingers[n, 1] - q[1]
-        bx, by = c * dx + s * dy, c * dy - s * dx
-        nx, ny = facets[f, 2], facets[f, 3]
-        g[k] = (bx - facets[f, 0]) * nx + (by - facets[f, 1]) * ny
-        worst = min(worst, g[k])
+        n, f = room.which[k, 0], room.which[k, 1]
+        dx, dy = room.fingers[n, 0] - q[0], room.fingers[n, 1] - q[1]
+        x, y = c * dx + s * dy, c * dy - s * dx
+        nx, ny = law.facets[f].nx, law.facets[f].ny
+        room.g[k] = _height(law.facets, f, x, y)
+        worst = min(worst, room.g[k])
         wx, wy = c * nx - s * ny, s * nx + c * ny
-        a0, a1, a2 = -(cs * wx + sn * wy), -(cs * wy - sn * wx), by * nx - bx * ny
+        a0, a1, a2 = -(cs * wx + sn * wy), -(cs * wy - sn * wx), y * nx - x * ny
         for d in range(3):
-            A[k, d] = W[d, 0] * a0 + W[d, 1] * a1 + W[d, 2] * a2
+            room.A[k, d] = law.W[d, 0] * a0 + law.W[d, 1] * a1 + law.W[d, 2] * a2
     return worst
 
 
@@ -215,19 +216,18 @@ def _linearise(
 def _depth(facets: np.ndarray, fingers: np.ndarray, q: np.ndarray) -> float:
     """How deep the deepest finger is inside; 0 where none is."""
     cs, sn = np.cos(q[2]), np.sin(q[2])
-    deepest = 0.0
+    deepest, V = 0.0, len(facets)
     for n in range(len(fingers)):
         dx, dy = fingers[n, 0] - q[0], fingers[n, 1] - q[1]
         x, y = cs * dx + sn * dy, cs * dy - sn * dx
         inside, nearest = False, np.inf
-        for f in range(len(facets)):
-            ax, ay = facets[f, 0], facets[f, 1]
-            bx, by = facets[(f + 1) % len(facets), 0], facets[(f + 1) % len(facets), 1]
-            if (ay > y) != (by > y) and x < ax + (y - ay) * (bx - ax) / (by - ay):
+        for f in range(V):
+            a, b = facets[f], facets[(f + 1) % V]
+            if (a.y > y) != (b.y > y) and x < a.x + (y - a.y) * (b.x - a.x) / (b.y - a.y):
                 inside = not inside
-            along = min(max((x - ax) * facets[f, 4] + (y - ay) * facets[f, 5], 0.0), facets[f, 6])
-            off = np.hypot(x - ax - along * facets[f, 4], y - ay - along * facets[f, 5])
-            nearest = min(nearest, off)
+            along = min(max(_along(facets, f, x, y), 0.0), a.length)
+            foot_x, foot_y = a.x + along * a.tx, a.y + along * a.ty
+            nearest = min(nearest, np.hypot(x - foot_x, y - foot_y))
         if inside:
             deepest = max(deepest, nearest)
     return deepest

@@ -16,7 +16,7 @@ import numpy as np
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import facet_frames, facets, mass_properties, reflex_vertices
 from expert.geometry.pose import Array
-from expert.grasping.sweep_kernel import REACH, sweep_all
+from expert.grasping.sweep_kernel import FACET, NEARBY, Law, sweep_all
 from expert.world.frame import Frame
 from expert.world.shape import Shape
 from expert.world.values import readonly, require
@@ -77,19 +77,13 @@ def sweep(
     starts = readonly(starts, (None, 3), "starts")
     goal = np.zeros(3) if goal is None else readonly(goal, (3,), "goal")
     require(len(path) >= 2, "path", "at least 2 knots", len(path))
-    require(0 < step <= REACH / 4, "step", f"a length over the diameter of at most {REACH / 4:g}", step)
+    require(0 < step <= NEARBY / 4, "step", f"a length over the diameter of at most {NEARBY / 4:g}", step)
     lengths = _Lengths(shape, goal)
     frame = lengths.frame
     times = np.linspace(0, len(path) - 1, (len(path) - 1) * samples + 1)
-    poses, stalled = sweep_all(
-        lengths.facet_rows(),
-        np.ascontiguousarray(frame.relative(path)),
-        frame.configuration(starts),
-        times,
-        lengths.metric_root(metric),
-        lengths.radius,
-        step,
-    )
+    relative = np.ascontiguousarray(frame.relative(path))
+    law = Law(relative, lengths.facets(), lengths.metric_root(metric), lengths.radius, step)
+    poses, stalled = sweep_all(law, frame.configuration(starts), times)
     if (inside := np.flatnonzero(stalled < 0)).size:
         raise InvalidProblem(
             f"starts[{inside[0]}]", expected="a pose that no finger enters", got="one with a finger inside"
@@ -107,12 +101,13 @@ class _Lengths:
         self.gyration = np.sqrt(plate.second_moment / plate.area) / shape.size
         self.radius = float(np.linalg.norm(self.vertices, axis=1).max())
 
-    def facet_rows(self) -> Array:
-        """(V, 8): start, outward normal, tangent, length, 1 where the start vertex is reflex."""
+    def facets(self) -> np.ndarray:
+        """Of the object, as the kernel wants them (V,)."""
         a, b = facets(self.vertices)
         inward, tangent = facet_frames(self.vertices)
         length = np.linalg.norm(b - a, axis=1)
-        return np.column_stack([a, -inward, tangent, length, reflex_vertices(self.vertices)])
+        columns = (*a.T, *-inward.T, *tangent.T, length, reflex_vertices(self.vertices))
+        return np.rec.fromarrays(columns, dtype=FACET).view(np.ndarray)
 
     def metric_root(self, metric: Array | None) -> Array:
         """Inverse transposed root W of the metric B = U^T U: a gradient a becomes W a where twists become U xi."""

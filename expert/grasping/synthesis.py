@@ -3,14 +3,14 @@
 No proposal leaves as `certified` unless `expert.verify.grasp.check` has confirmed it.
 """
 
-import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from itertools import islice
 
+from expert.budget import Budget
 from expert.errors import InvalidProblem
 from expert.geometry.pose import rotation
-from expert.grasping.proposals import Proposal, Search, decomposed, goal_cells, thesis
+from expert.grasping.proposals import Proposal, RelativeProblem, decomposed, goal_cells, thesis
 from expert.grasping.smooth import acceleration
 from expert.problems.grasp import GraspMethod, GraspOptions, GraspProblem, GraspSolution
 from expert.verify.grasp.check import verify_grasp
@@ -31,24 +31,22 @@ def solve(
     """A certified grasp, the best by the problem's cost among those that the method proposes (Thesis 5.2.5).
 
     goal_cell: goal cells, and the decomposed search where none of them is confirmed; the answer names what found it.
-    time_limit [s].  Raises InvalidProblem for an unknown method.
+    time_limit [s]: processor time.  Raises InvalidProblem for an unknown method.
     """
     if method not in METHODS:
         raise InvalidProblem("method", expected=" or ".join(METHODS), got=repr(method))
-    began = time.perf_counter()
-    search = Search(problem, began + time_limit)
+    task = RelativeProblem(problem, Budget(time_limit))
     doubted: list[GraspSolution] = []
-    for proposals in METHODS[method](search):
-        found = _first_certified(search, proposals, doubted)
-        if found is not None or search.left <= 0:
+    for proposals in METHODS[method](task):
+        found = _first_certified(task, proposals, doubted)
+        if found is not None or task.budget.over:
             break
-    answer = found or _without_certificate(search, doubted)
-    seconds = time.perf_counter() - began
-    return replace(answer, method=answer.method or method, refuted=len(doubted), seconds=seconds)
+    answer = found or _without_certificate(task, doubted)
+    return replace(answer, method=answer.method or method, refuted=len(doubted), seconds=task.budget.spent)
 
 
 def _first_certified(
-    search: Search, proposals: Iterator[Proposal], doubted: list[GraspSolution]
+    task: RelativeProblem, proposals: Iterator[Proposal], doubted: list[GraspSolution]
 ) -> GraspSolution | None:
     """The first proposal that the checker confirms; the others are added to `doubted`.
 
@@ -56,56 +54,57 @@ def _first_certified(
     """
     unsure: list[GraspSolution] = []
     for proposal in proposals:
-        answer = _answer(search, proposal)
-        report = _check(search, answer, QUICK_CHECK)
+        answer = _answer(task, proposal)
+        report = _check(task, answer, QUICK_CHECK)
         if report.verdict == "certified":
             return replace(answer, status="certified")
         doubted.append(replace(answer, reason=report.reason))
         if report.verdict == "unknown":
             unsure.append(answer)
-        if search.left <= 0:
+        if task.budget.over:
             return None
     for answer in unsure:
-        if search.left > 0 and _check(search, answer, PATIENT_CHECK).verdict == "certified":
+        if not task.budget.over and _check(task, answer, PATIENT_CHECK).verdict == "certified":
             doubted.pop()
             return replace(answer, status="certified")
     return None
 
 
-def _check(search: Search, answer: GraspSolution, seconds: float) -> GraspReport:
-    return verify_grasp(search.problem, answer.path, answer.facets, full=False, time_limit=seconds)
+def _check(task: RelativeProblem, answer: GraspSolution, seconds: float) -> GraspReport:
+    limit = min(seconds, task.budget.left)
+    return verify_grasp(task.problem, answer.path, answer.facets, full=False, time_limit=limit)
 
 
-def _without_certificate(search: Search, doubted: list[GraspSolution]) -> GraspSolution:
+def _without_certificate(task: RelativeProblem, doubted: list[GraspSolution]) -> GraspSolution:
     """The first answer that was not confirmed, or why there is none."""
     if doubted:
         return doubted[0]
-    if search.left <= 0:
+    if task.budget.over:
         reason = "the time limit was reached before any grasp was found"
         return GraspSolution(status="time_limit", reason=reason)
     return GraspSolution(status="none_found", reason="no grasp of the kind searched for; others may exist")
 
 
-def _answer(search: Search, proposal: Proposal) -> GraspSolution:
-    frame = search.frame
+def _answer(task: RelativeProblem, proposal: Proposal) -> GraspSolution:
+    frame = task.frame
     path = frame.world(proposal.path)
     return GraspSolution(
         status="uncertified",
         path=path,
         facets=proposal.facets,
         starts=frame.radius * proposal.starts @ rotation(frame.pose[2]).T,
-        objective=acceleration(path) if search.by_acceleration else proposal.area * frame.radius**2,
+        objective=acceleration(path) if task.by_acceleration else proposal.area * frame.radius**2,
         method=proposal.method,
     )
 
 
-METHODS: dict[GraspMethod, Callable[[Search], Iterable[Iterator[Proposal]]]] = {
-    "goal_cell": lambda search: (
-        islice(goal_cells(search), MOST_CELLS),
-        islice(decomposed(search), MOST_CHECKS),
+METHODS: dict[GraspMethod, Callable[[RelativeProblem], Iterable[Iterator[Proposal]]]] = {
+    "goal_cell": lambda task: (
+        islice(goal_cells(task), MOST_CELLS),
+        islice(decomposed(task), MOST_CHECKS),
     ),
-    "decomposed": lambda search: (islice(decomposed(search), MOST_CHECKS),),
-    "miqp1": lambda search: (islice(thesis(search, "miqp1"), MOST_CHECKS),),
-    "miqp2": lambda search: (islice(thesis(search, "miqp2"), MOST_CHECKS),),
+    "decomposed": lambda task: (islice(decomposed(task), MOST_CHECKS),),
+    "miqp1": lambda task: (islice(thesis(task, "miqp1"), MOST_CHECKS),),
+    "miqp2": lambda task: (islice(thesis(task, "miqp2"), MOST_CHECKS),),
 }
 """Families of proposals of each method, in the order in which they are tried."""

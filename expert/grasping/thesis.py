@@ -17,8 +17,10 @@ from collections.abc import Iterator, Sequence
 from typing import Literal
 
 from expert.geometry.pose import Array
+from expert.grasping.cell import GoalCell
 from expert.grasping.decomposed import Topology, fillings, path_of, topology_of
-from expert.grasping.nested import FacetGeometry, Grasp, Knot, NestedCages
+from expert.grasping.nested import FacetGeometry, NestedCages
+from expert.loops.model import Knot
 
 BEND_WEIGHT = 0.1
 """Weight of accelerations in the sum norm against alpha (both in enclosing radii)."""
@@ -31,11 +33,11 @@ def finish(model: NestedCages, name: Name) -> None:
     """The objective, as a quadratic program."""
     model.minimise_acceleration()
     if name == "miqp2":
-        model.milp.minimise([(-1.0, model.common_alpha())])
+        model.milp.minimise(-model.common_alpha())
 
 
 def solutions(
-    geometry: FacetGeometry, grasps: Sequence[Grasp], knots: Sequence[Knot], name: Name, seconds: float
+    geometry: FacetGeometry, grasps: Sequence[GoalCell], knots: Sequence[Knot], name: Name, seconds: float
 ) -> Iterator[tuple[Topology, Array]]:
     """Topologies and paths (K, N, 2), the best first; each is cut off when the next one is asked for."""
     order = itertools.count()
@@ -47,16 +49,16 @@ def solutions(
             value = float(model.milp.form().q @ answer.x)
             heapq.heappush(queue, (value, next(order), cuts, model, answer.x))
 
-    programs: dict[tuple[int, int], list[Grasp]] = {}
+    programs: dict[tuple[int, int], list[GoalCell]] = {}
     for grasp in grasps:
-        for hubs in fillings(geometry.table, grasp):
+        for hubs in fillings(grasp):
             programs.setdefault(hubs, []).append(grasp)
     for hubs, alike in programs.items():
         model = NestedCages(geometry, alike, knots, hubs=hubs)
         if model.feasible:
             model.minimise_bends(1.0 if name == "miqp1" else BEND_WEIGHT)
             if name == "miqp2":
-                model.milp.minimise([(-1.0, model.common_alpha())])
+                model.milp.minimise(-model.common_alpha())
             push(model, 0)
     while queue:
         _, _, cuts, model, x = heapq.heappop(queue)

@@ -16,12 +16,14 @@ import shapely
 from expert.geometry.convex import Region, free_regions
 from expert.geometry.cover import clip, half_planes, overlapping_cover
 from expert.geometry.polygon import facet_frames, facets
-from expert.geometry.pose import Array, cross, rotation
+from expert.geometry.pose import Array, cross, perpendicular, rotation
 
 STEP = np.radians(2.5)
 """Largest part of a rotation range that is swept at once."""
-REACH = 4.0
+FARTHEST = 4.0
 """Fingers stay within this distance (in enclosing radii) of the reference point, per coordinate."""
+HalfPlanes = tuple[Array, Array]
+"""A (h, 2) and b (h,) of {x : A x <= b}."""
 BoolMatrix = np.ndarray[tuple[int, int], np.dtype[np.bool_]]
 
 
@@ -50,17 +52,21 @@ class SweptGeometry:
     def meeting(self) -> BoolMatrix:
         """Whether pieces i and j overlap with an area that survives erosion by the clearance."""
         n = len(self.pieces)
-        return np.array([[len(self.common(i, j)[1]) > 0 for j in range(n)] for i in range(n)])
+        eroded = [[self._shared(i, j, 0.0, 0.0, self.clearance) for j in range(n)] for i in range(n)]
+        return np.array([[_has_area(polygon) for polygon in row] for row in eroded])
 
-    def common(self, i: int, j: int) -> tuple[Array, Array]:
-        """C_i intersect C_j eroded, as {x : A x <= b}; empty arrays where nothing is left."""
-        A, b = half_planes(self.pieces[i])
-        overlap = clip(self.pieces[j], A, b)
-        if not _has_area(overlap):
-            return np.empty((0, 2)), np.empty(0)
-        A, b = half_planes(cleaned(overlap))
-        inner = clip(overlap, A, b - self.clearance)
-        return (A, b - self.clearance) if _has_area(inner) else (np.empty((0, 2)), np.empty(0))
+    def common(self, low: float, high: float, clearance: float) -> dict[tuple[int, int], HalfPlanes]:
+        """Points in both of two pieces that meet at all angles in [low, high], as {x : A x <= b}; none: 0 <= -1."""
+        sets = {}
+        for i, j in zip(*np.nonzero(self.meeting), strict=True):
+            shared = self._shared(i, j, low, high, clearance)
+            nothing = np.zeros((1, 2)), np.array([-1.0])
+            sets[int(i), int(j)] = half_planes(cleaned(shared)) if _has_area(shared) else nothing
+        return sets
+
+    def _shared(self, i: int, j: int, low: float, high: float, clearance: float) -> Array:
+        overlap = clip(self.pieces[j], *half_planes(self.pieces[i]))
+        return swept_inside(cleaned(overlap), low, high, clearance) if _has_area(overlap) else overlap[:0]
 
     @cached_property
     def differences(self) -> dict[tuple[int, int], Array]:
@@ -68,7 +74,7 @@ class SweptGeometry:
         indices = range(len(self.pieces))
         return {(i, j): _minkowski(self.pieces[i], -self.pieces[j]) for i in indices for j in indices}
 
-    def overlaps(self, low: float, high: float) -> dict[tuple[int, int], tuple[Array, Array]]:
+    def overlaps(self, low: float, high: float) -> dict[tuple[int, int], HalfPlanes]:
         """Non-empty K_ij over [low, high], eroded, as {x : A x <= b}."""
         sets = {}
         for key, polygon in self.differences.items():
@@ -79,19 +85,20 @@ class SweptGeometry:
 
     @cached_property
     def regions(self) -> list[Region]:
-        """Convex regions for fingers; those with facets of the object as bounds keep clear of them."""
-        cleared = [self.cleared(region) for region in free_regions(self.vertices)]
-        square = REACH * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-        return [r for r in cleared if _has_area(clip(square, r.A, r.b))]
+        """Convex regions in which fingers find room beside the object."""
+        square = FARTHEST * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        found = free_regions(self.vertices)
+        inner = [self.cleared(region, self.clearance) for region in found]
+        return [r for r, c in zip(found, inner, strict=True) if _has_area(clip(square, c.A, c.b))]
 
-    def cleared(self, region: Region) -> Region:
+    def cleared(self, region: Region, clearance: float) -> Region:
         """A free region without the strip along the object's facets that the clearance takes."""
         inward, _ = facet_frames(self.vertices)
         offsets = (inward * facets(self.vertices)[0]).sum(axis=1)
         same = (np.abs(region.A[:, None] - inward[None]).max(axis=2) < 1e-9) & (
             np.abs(region.b[:, None] - offsets[None]) < 1e-9
         )
-        return Region(region.A, region.b - self.clearance * same.any(axis=1))
+        return Region(region.A, region.b - clearance * same.any(axis=1))
 
     @cached_property
     def directions(self) -> Array:
@@ -100,7 +107,7 @@ class SweptGeometry:
         Along pieces that meet, neighbouring angles differ by less than pi: the object is simply connected and the
         finger outside it, so that such angles exist.
         """
-        square = REACH * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        square = FARTHEST * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
         rows = []
         for region in self.regions:
             corners = clip(square, region.A, region.b)
@@ -141,15 +148,14 @@ def swept_inside(polygon: Array, low: float, high: float, clearance: float) -> A
     """
     normals, offsets = half_planes(polygon)
     offsets = offsets - clearance
-    result = polygon @ rotation(low).T
     bulging = offsets > 0
+    rows, bounds = [], []
     for middle, half in swept_steps(low, high):
-        for angle in (middle - half, middle + half):
-            result = clip(result, normals @ rotation(angle).T, offsets)
-        result = clip(result, normals[bulging] @ rotation(middle).T, offsets[bulging] * np.cos(half))
-        if len(result) < 3:
-            break
-    return result
+        c, s = np.cos([middle - half, middle + half, middle]), np.sin([middle - half, middle + half, middle])
+        turned = c[:, None, None] * normals + s[:, None, None] * perpendicular(normals)
+        rows += [turned[0], turned[1], turned[2, bulging]]
+        bounds += [offsets, offsets, offsets[bulging] * np.cos(half)]
+    return clip(polygon @ rotation(low).T, np.concatenate(rows), np.concatenate(bounds))
 
 
 def _minkowski(a: Array, b: Array) -> Array:

@@ -1,7 +1,9 @@
-"""SCIP, HiGHS and Gurobi behind one form; each says what it proved and nothing more.  One thread each."""
+"""SCIP, HiGHS and Gurobi behind one form; each says what it proved and nothing more.  One thread each.
+
+A time_limit is processor time (`expert.budget`) from the call on, with what it takes to hand the model over.
+"""
 
 import importlib
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -10,7 +12,9 @@ import highspy
 import numpy as np
 import pyscipopt
 import scipy.sparse as sp
+from highspy._core import _Highs  # highspy.Highs prints a banner before it can be silenced
 
+from expert.budget import Budget
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
 
@@ -58,12 +62,11 @@ def backend(solver: Solver) -> Callable[..., Answer]:
 
 def scip(form: StandardForm, gap: float, time_limit: float) -> Answer:
     """Convex quadratic objective: one epigraph variable per square, which SCIP separates better than one cone."""
-    model = pyscipopt.Model()
+    budget, model = Budget(time_limit), pyscipopt.Model()
     model.hideOutput()
     model.setSeparating(
         pyscipopt.SCIP_PARAMSETTING.FAST
     )  # thorough rounding cuts cost most of the time and gain little
-    scip_limits(model, gap, time_limit)
     x = [
         model.addVar(vtype="I" if i else "C", lb=_finite(a), ub=_finite(b))
         for i, a, b in zip(form.integral, form.low, form.high, strict=True)
@@ -77,13 +80,14 @@ def scip(form: StandardForm, gap: float, time_limit: float) -> Answer:
     model.setObjective(
         _epigraphs(model, x, form.P) + pyscipopt.quicksum(c * v for c, v in zip(form.q, x, strict=True))
     )
+    scip_limits(model, gap, budget.left)
     model.optimize()
     return scip_answer(model, x)
 
 
 def scip_limits(model: pyscipopt.Model, gap: float, time_limit: float) -> None:
     """Stop at this gap or after this much processor time [s]: what is found must not depend on the machine's load."""
-    model.setParams({"limits/gap": gap, "limits/time": time_limit, "timing/clocktype": 1})
+    model.setParams({"limits/gap": gap, "limits/time": min(time_limit, 1e20), "timing/clocktype": 1})
 
 
 def scip_answer(model: pyscipopt.Model, x: list) -> Answer:
@@ -128,20 +132,15 @@ def _finite(bound: float) -> float | None:
 
 
 def highs(form: StandardForm, gap: float, time_limit: float) -> Answer:
-    """Linear objectives only; time_limit is processor time where there are integers.  Raises InvalidProblem for squares."""
+    """Linear objectives only.  Raises InvalidProblem for squares."""
     if not form.is_linear:
         raise InvalidProblem("solver", expected="scip or gurobi for a quadratic objective", got="highs")
-    model = highspy.Highs()
+    budget, model = Budget(time_limit), _Highs()
     is_mip = bool(form.integral.any())
-    for option, value in {
-        "output_flag": False,
-        "mip_rel_gap": gap,
-        "time_limit": np.inf if is_mip else float(time_limit),
-        "threads": 1,
-    }.items():
+    for option, value in {"output_flag": False, "mip_rel_gap": gap, "threads": 1}.items():
         model.setOptionValue(option, value)
-    if is_mip:
-        _stop_after(model, time_limit)
+    if np.isfinite(time_limit):
+        _stop_when_over(model, budget)
     model.passModel(_highs_model(form))
     model.run()
     info, word = model.getInfo(), model.getModelStatus().name
@@ -163,15 +162,16 @@ def highs(form: StandardForm, gap: float, time_limit: float) -> Answer:
     return Answer(status=status, x=point, bound=bound, nodes=max(int(info.mip_node_count), 0), message=word)
 
 
-def _stop_after(model: highspy.Highs, seconds: float) -> None:
-    """Interrupt branch and bound after so much processor time: its own limit is wall time, which depends on the load."""
-    began = time.thread_time()
+def _stop_when_over(model: _Highs, budget: Budget) -> None:
+    """Interrupt it by our clock: its own limit is wall time, which depends on the machine's load."""
 
     def stop(kind: object, message: str, seen: object, answer: Any, data: object) -> None:
-        answer.user_interrupt = time.thread_time() - began > seconds
+        answer.user_interrupt = budget.over
 
     model.setCallback(stop, None)
-    model.startCallback(highspy.cb.HighsCallbackType.kCallbackMipInterrupt)
+    kinds = highspy.cb.HighsCallbackType
+    for kind in (kinds.kCallbackMipInterrupt, kinds.kCallbackSimplexInterrupt, kinds.kCallbackIpmInterrupt):
+        model.startCallback(kind)
 
 
 def _highs_model(form: StandardForm) -> highspy.HighsLp:
@@ -192,7 +192,12 @@ def _highs_model(form: StandardForm) -> highspy.HighsLp:
 
 def gurobi(form: StandardForm, gap: float, time_limit: float) -> Answer:
     """Raises InvalidProblem where gurobipy is not installed or has no licence for this size."""
-    grb = _gurobipy()
+    budget, grb = Budget(time_limit), _gurobipy()
+
+    def stop(running: Any, where: int) -> None:
+        if budget.over:
+            running.terminate()
+
     try:
         with grb.Env(params={"OutputFlag": 0}) as env, grb.Model(env=env) as model:
             x = model.addMVar(
@@ -204,23 +209,22 @@ def gurobi(form: StandardForm, gap: float, time_limit: float) -> Answer:
             model.setObjective(x @ (0.5 * form.P.tocsr()) @ x + form.q @ x)
             for name, value in {
                 "MIPGap": gap,
-                "TimeLimit": time_limit,
                 "Threads": 1,
                 "DualReductions": 0,
             }.items():
                 model.setParam(name, value)
-            model.optimize()
-            return _gurobi_answer(model, x, grb.GRB)
+            model.optimize(stop)
+            return _gurobi_answer(model, x, grb.GRB, budget)
     except grb.GurobiError as error:
         raise InvalidProblem("solver", expected="a Gurobi licence for this model", got=str(error)) from error
 
 
-def _gurobi_answer(model: Any, x: Any, codes: Any) -> Answer:
-    if model.Status == codes.INTERRUPTED:
+def _gurobi_answer(model: Any, x: Any, codes: Any, budget: Budget) -> Answer:
+    if model.Status == codes.INTERRUPTED and not budget.over:
         raise KeyboardInterrupt
     found = model.SolCount > 0
     proved: dict[int, Status] = {codes.OPTIMAL: "optimal", codes.INFEASIBLE: "infeasible"}
-    limits = (codes.TIME_LIMIT, codes.NODE_LIMIT, codes.ITERATION_LIMIT, codes.MEM_LIMIT, codes.WORK_LIMIT)
+    limits = (codes.INTERRUPTED, codes.NODE_LIMIT, codes.ITERATION_LIMIT, codes.MEM_LIMIT)
     status = proved.get(model.Status, "failed")
     if model.Status in limits:
         status = "feasible" if found else "limit"

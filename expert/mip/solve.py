@@ -1,6 +1,5 @@
 """Solve a mixed-integer convex program written in cvxpy, and say exactly what is known afterwards."""
 
-import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +10,7 @@ import scipy.sparse as sp
 from cvxpy.reductions.solution import Solution
 from cvxpy.reductions.solvers.qp_solvers.qp_solver import QpSolver
 
+from expert.budget import Budget
 from expert.geometry.pose import Array
 from expert.mip.backends import Answer, Solver, StandardForm, Status, backend
 
@@ -24,7 +24,7 @@ class Result:
 
     status: optimal (within the gap asked for), feasible (budget spent; the incumbent stands in the variables),
     infeasible (proved), limit (budget spent, no incumbent yet: says nothing), failed (numerical trouble: says nothing).
-    value, bound: objective of the incumbent and its certified lower bound, both inf where infeasible.  seconds: wall time with compilation.
+    value, bound: objective of the incumbent and its certified lower bound, both inf where infeasible.  seconds: processor time with compilation.
     """
 
     status: Status
@@ -50,15 +50,14 @@ def solve(
 ) -> Result:
     """Minimise; the incumbent, if any, is left in the problem's variables.  Never prints.
 
-    scip: linear or convex quadratic.  highs: linear.  gurobi: both, with a licence.  time_limit [s] excludes compilation, and
-    is processor time for scip, and for highs where there are integers.
+    scip: linear or convex quadratic.  highs: linear.  gurobi: both, with a licence.  time_limit [s]: processor time with
+    compilation.
     Raises KeyboardInterrupt when interrupted, InvalidProblem for a solver that is missing or does not fit.
     """
-    start = time.perf_counter()
-    optimise = backend(solver)
+    budget, optimise = Budget(time_limit), backend(solver)
     data, chain, inverse = problem.get_problem_data(_Compiler(), canon_backend=cp.SCIPY_CANON_BACKEND)
     form = _standard_form(data)
-    answer = optimise(form, gap, time_limit)
+    answer = optimise(form, gap, budget.left)
     status, message = _judge(form, answer)
     value, offset = np.inf, inverse[-1][keys.OFFSET]
     if status in ("optimal", "feasible"):
@@ -68,7 +67,7 @@ def solve(
         status=status,
         value=value,
         bound=min(float(answer.bound + offset), value),
-        seconds=time.perf_counter() - start,
+        seconds=budget.spent,
         nodes=answer.nodes,
         message=message,
     )

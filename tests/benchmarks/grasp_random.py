@@ -13,14 +13,14 @@ observability  sensor rank 3 exactly where first-order form closure holds, 1,000
 
 import itertools
 import sys
-import time
 from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import linprog
 
+from expert.budget import Budget
 from expert.geometry.pose import Array
-from expert.grasping.proposals import Search, thesis
+from expert.grasping.proposals import RelativeProblem, thesis
 from expert.grasping.sweeping import sweep
 from expert.problems.grasp import GraspProblem
 from expert.verify.grasp.check import verify_grasp
@@ -89,7 +89,7 @@ def unchecked(study: Study) -> tuple[list[Row], Bars]:
     rows = []
     for name in watched(["polygon 1"] if study.quick else list(study.random)[:4], "unchecked"):
         problem, row = task(study.objects[name], 45.0), _tally()
-        search = Search(problem, time.perf_counter() + TIME_LIMIT)
+        search = RelativeProblem(problem, Budget(TIME_LIMIT))
         for proposal in itertools.islice(thesis(search, "miqp2"), 1 if study.quick else 5):
             path = search.frame.world(proposal.path)
             _judge(problem, path, verify_grasp(problem, path, full=False, time_limit=CHECK), row)

@@ -2,32 +2,22 @@
 
 import numpy as np
 import pytest
-import shapely
 
 from expert.caging.immobilise import candidates
-from expert.caging.model import triangles
 from expert.caging.synthesis import solve
 from expert.errors import InvalidProblem
-from expert.geometry.cover import clip
 from expert.geometry.polygon import signed_distance
-from expert.geometry.pose import Array, rotation
-from expert.loops.swept import SweptGeometry, swept_steps
+from expert.geometry.pose import Array
 from expert.problems.cage import CageProblem, CageSolution
 from expert.verify.cage.check import verify, verify_cage
 from expert.world.fingers import Gripper
-from expert.world.frame import Frame
 from expert.world.named import named_shape
 from expert.world.shape import Shape
-from tests.support.polygons import random_nonconvex_polygon, random_polygon
+from tests.support.polygons import random_polygon
 
 
 def problem(vertices: Array, count: int, **changes: object) -> CageProblem:
     return CageProblem(shape=Shape(vertices=vertices), pose=np.zeros(3), count=count, **changes)  # type: ignore[arg-type]
-
-
-def geometry(vertices: Array, clearance: float = 1e-3) -> SweptGeometry:
-    shape = Shape(vertices=vertices)
-    return SweptGeometry(Frame.of(shape, np.zeros(3)).body(shape.vertices), clearance)
 
 
 @pytest.mark.parametrize("count", [3, 4, 5])
@@ -92,52 +82,6 @@ def test_costs_order_two_finger_cages() -> None:
         assert answer.found
         spans[cost] = float(np.linalg.norm(answer.fingers[1] - answer.fingers[0]))
     assert spans["min_separation"] < 0.8 * spans["max_opening"]
-
-
-def test_swept_overlaps_hold_at_every_orientation_of_the_range() -> None:
-    geo = geometry(named_shape("T"))
-    low, high = np.radians(-12), np.radians(31)
-    rng = np.random.default_rng(0)
-    for (i, j), (A, b) in geo.overlaps(low, high).items():
-        K = clip(9 * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]]), A, b)
-        for _ in range(20):
-            gap = rng.dirichlet(np.ones(len(K))) @ K
-            for angle in np.linspace(low, high, 60):
-                first = shapely.Polygon(-geo.pieces[i] @ rotation(angle).T + gap)
-                second = shapely.Polygon(-geo.pieces[j] @ rotation(angle).T)
-                assert first.intersects(second)
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_regions_avoid_the_object_and_directions_separate(seed: int) -> None:
-    geo = geometry(random_nonconvex_polygon(np.random.default_rng(seed), 5 + seed))
-    square = 3 * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
-    rng = np.random.default_rng(seed)
-    for r, region in enumerate(geo.regions):
-        corners = clip(square, region.A, region.b)
-        points = rng.dirichlet(np.ones(len(corners)), 30) @ corners
-        assert (signed_distance(geo.vertices, points) > 0).all()
-        for i, piece in enumerate(geo.pieces):
-            u = np.array([np.cos(geo.directions[r, i]), np.sin(geo.directions[r, i])])
-            assert ((points[:, None] - piece[None]) @ u).min() > -1e-9
-    i, j = np.nonzero(geo.meeting)
-    assert (np.abs(geo.directions[:, i] - geo.directions[:, j]) < np.pi + 1e-9).all()
-
-
-def test_steps_partition_a_range() -> None:
-    steps = swept_steps(-0.3, 0.5)
-    edges = [m - h for m, h in steps] + [steps[-1][0] + steps[-1][1]]
-    assert edges[0] == pytest.approx(-0.3)
-    assert edges[-1] == pytest.approx(0.5)
-    assert max(np.diff(edges)) <= np.radians(2.5) + 1e-12
-
-
-@pytest.mark.parametrize(("count", "hub"), [(3, 0), (4, 1), (6, 2)])
-def test_fans_share_edges_with_the_loop(count: int, hub: int) -> None:
-    corners = [[c for c, _ in triangle] for triangle in triangles(count, hub)]
-    assert len(corners) == count - 2
-    edges = {frozenset((a, b)) for t in corners for a in t for b in t if a != b}
-    assert all(frozenset((k, (k + 1) % count)) in edges for k in range(count))
 
 
 def test_immobilising_grasps_are_outside_and_mostly_cage() -> None:

@@ -1,12 +1,11 @@
 """MIP1 as a method: its answers are verified, refuted ones are cut off, and both solvers agree."""
 
-import time
-
 import numpy as np
 import pytest
 
+from expert.budget import Budget
 from expert.caging import synthesis
-from expert.caging.model import Proposal
+from expert.caging.model import Guess
 from expert.caging.synthesis import solve
 from expert.caging.tally import Tally
 from expert.caging.thesis import ThesisModel, slices
@@ -19,6 +18,7 @@ from expert.world.fingers import Gripper
 from expert.world.frame import Frame
 from expert.world.named import named_shape
 from expert.world.shape import Shape
+from expert.world.walls import Segment
 from tests.support.polygons import random_polygon
 
 NARROW = ((np.radians(40), np.radians(40)),)
@@ -66,7 +66,7 @@ def test_a_spent_limit_is_called_that() -> None:
     "extra",
     [
         {"fixed": np.array([[0.2, 0.0]])},
-        {"walls": np.array([[[-0.2, -0.2], [0.2, -0.2]]])},
+        {"walls": (Segment(ends=np.array([[-0.2, -0.2], [0.2, -0.2]])),)},
         {"cost": "min_separation"},
         {"grippers": (Gripper(fingers=(0, 1), opening=(0.0, 0.1)),)},
     ],
@@ -83,10 +83,10 @@ class Scripted:
         self.proposals = list(proposals)
         self.cuts = 0
 
-    def propose(self, solver: Solver, time_limit: float) -> Proposal:
+    def propose(self, solver: Solver, seconds: float) -> Guess:
         if not self.proposals:
-            return Proposal(status="infeasible")
-        return Proposal(status="optimal", fingers=self.proposals.pop(0))
+            return Guess(status="infeasible")
+        return Guess(status="optimal", fingers=self.proposals.pop(0))
 
     def cut_off(self) -> None:
         self.cuts += 1
@@ -97,7 +97,7 @@ def test_no_false_cage_leaves_the_loop() -> None:
     task = problem(named_shape("T"), rotation=NARROW)
     real = solve(task, time_limit=60).fingers
     frame = Frame.of(task.shape, task.pose)
-    tally = Tally(task, time.thread_time() + 60)
+    tally = Tally(task, Budget(60))
     model = Scripted(frame.relative(real + 0.3), frame.relative(0 * real), frame.relative(real))
     synthesis._search(tally, model, frame, 1.0, "highs")  # type: ignore[arg-type]
     assert (tally.refuted, model.cuts, tally.attempts) == (2, 2, 3)
@@ -108,7 +108,7 @@ def test_no_false_cage_leaves_the_loop() -> None:
 def test_only_refuted_answers_leave_nothing() -> None:
     task = problem(named_shape("T"), rotation=NARROW)
     frame = Frame.of(task.shape, task.pose)
-    tally = Tally(task, time.thread_time() + 60)
+    tally = Tally(task, Budget(60))
     model = Scripted(*[np.array([[2.0, 0], [2.0, 1], [2.0, -1]])] * 9)
     synthesis._search(tally, model, frame, 1.0, "highs")  # type: ignore[arg-type]
     assert tally.refuted == model.cuts == synthesis.MOST_CUTS

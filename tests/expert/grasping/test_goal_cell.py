@@ -13,10 +13,11 @@ from scipy.optimize import linprog, nnls
 from expert.geometry.polygon import signed_area
 from expert.geometry.pose import Array, rotation
 from expert.grasping.cell import GoalCell
-from expert.grasping.facets import Facets, rays, spans, tuples
+from expert.grasping.facets import Facets, tuples
 from expert.grasping.goal_cell import candidate, cells, largest_start, region, start_knot
 from expert.grasping.rows import Rows
 from expert.grasping.smooth import acceleration, smoothest
+from expert.loops.normals import rays, spans
 from expert.world.frame import Frame
 from expert.world.named import named_shape
 from expert.world.shape import Shape

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 import shapely
 
+from expert.budget import Budget
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import signed_area, signed_distance
 from expert.geometry.pose import Array, rotation, to_body
+from expert.grasping.cell import GoalCell
 from expert.grasping.decomposed import fillings, smooth_path, topologies
-from expert.grasping.facets import Facets
 from expert.grasping.gripper import placements
-from expert.grasping.nested import FacetGeometry, Grasp, Knot, schedule
-from expert.grasping.proposals import Search, decomposed, goal_cells
+from expert.grasping.nested import FacetGeometry, schedule, shut
+from expert.grasping.proposals import RelativeProblem, decomposed, goal_cells
 from expert.grasping.synthesis import solve
 from expert.problems.grasp import GraspProblem, GraspSolution
 from expert.verify.grasp.check import verify_grasp
@@ -76,7 +77,7 @@ def test_a_wide_range_needs_cages_that_are_no_goal_cells() -> None:
 
 def test_the_thesis_conditions_alone_admit_a_grasp_that_jams() -> None:
     task = problem(Shape(vertices=irregular_polygon(np.random.default_rng(8), 6)), 30.0)
-    search = Search(task, FOREVER)
+    search = RelativeProblem(task, Budget(FOREVER))
     verdicts = []
     for proposal, _ in zip(decomposed(search), range(3), strict=False):
         path = search.frame.world(proposal.path)
@@ -119,7 +120,7 @@ def test_nested_cages_overlap_all_the_way_and_are_shut_at_their_limits() -> None
     ranges = np.radians([30, 22.5, 15, 7.5, 0.5])
     geometry = FacetGeometry(frame.body(shape.vertices), 0.002)
     knots = schedule(ranges, 0.002)
-    grasp = Grasp((1, 2, 3, 0), 1, 0)
+    grasp = GoalCell(geometry.table, (1, 2, 3, 0), 1, 0, 0.002)
     found = list(topologies(geometry, grasp, knots, 5.0))
     assert found
     path = smooth_path(geometry, found[0], knots, 0.98)
@@ -140,21 +141,22 @@ def _hole_near_goal(obstacles: Array) -> bool:
 
 
 def test_ranges_that_must_be_shut_cover_everything_between_arrival_and_departure() -> None:
-    for knot in schedule(np.radians([30, 20, 9, 4, 0.5]), 0.001):
-        parts = knot.shut()
-        assert parts[0][0] == knot.limit
-        assert parts[-1][1] == pytest.approx(knot.reach)
+    limits = np.radians([30, 20, 9, 4, 0.5])
+    for knot, limit, reach in zip(schedule(limits, 0.001), limits, limits[[0, 0, 1, 2, 3]], strict=True):
+        parts = knot.above
+        assert parts[0][0] == limit
+        assert parts[-1][1] == pytest.approx(reach)
+        assert [(-high, -low) for low, high in parts] == list(knot.below)
         assert all(high == low for (_, high), (low, _) in itertools.pairwise(parts))
         assert all(high - low <= np.radians(4) + 1e-12 and high <= 2 * low + 1e-12 for low, high in parts)
-    assert Knot(0.1, 0.1, 0.0).shut() == [(0.1, 0.1)]
+    assert shut(0.1, 0.1) == [(0.1, 0.1)]
 
 
 def test_the_filling_that_the_rays_name_is_the_one_that_works() -> None:
     shape = quadrangle(3)
     geometry = FacetGeometry(Frame.of(shape, np.zeros(3)).body(shape.vertices), 0.002)
-    table = Facets.of(geometry.vertices)
-    assert fillings(table, Grasp((1, 2, 3, 0), 1, 0)) == [(0, 1)]
-    assert fillings(table, Grasp((1, 2, 3, 0), 0, 1)) == [(1, 0)]
+    assert fillings(GoalCell(geometry.table, (1, 2, 3, 0), 1, 0, 0.002)) == [(0, 1)]
+    assert fillings(GoalCell(geometry.table, (1, 2, 3, 0), 0, 1, 0.002)) == [(1, 0)]
 
 
 @pytest.mark.parametrize("parallel", [True, False])
@@ -188,7 +190,7 @@ def test_grippers_tell_fingers_apart_only_as_far_as_they_must() -> None:
 
 def test_three_fingers_hold_to_second_order() -> None:
     task = problem(quadrangle(9), count=3)
-    search = Search(task, FOREVER)
+    search = RelativeProblem(task, Budget(FOREVER))
     proposal = next(goal_cells(search))
     assert proposal.path.shape == (5, 3, 2)
     report = verify_grasp(task, search.frame.world(proposal.path), proposal.facets, full=False)

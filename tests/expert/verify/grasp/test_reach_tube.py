@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from expert.budget import Budget
-from expert.grasping.proposals import Search, goal_cells
+from expert.grasping.proposals import RelativeProblem, goal_cells
 from expert.problems.grasp import GraspProblem
 from expert.verify.grasp.check import verify_grasp
 from expert.verify.grasp.dead_ends import dead_end_events
@@ -37,7 +37,7 @@ def test_pockets_are_free_and_lead_to_their_dead_end(seed: int) -> None:
 def test_a_flood_that_knows_the_pockets_keeps_out_of_them_with_cells_as_wide() -> None:
     shape = Shape(vertices=irregular_polygon(np.random.default_rng(0), 4))
     problem = GraspProblem(shape=shape, pose=np.zeros(3), half_ranges=HALF_RANGES)
-    search = Search(problem, deadline=np.inf)
+    search = RelativeProblem(problem, Budget(np.inf))
     path = FingerPath(shape, np.zeros(3), search.frame.world(next(goal_cells(search)).path))
     assert verify_grasp(problem, path.knots_w, time_limit=np.inf).verdict == "certified"
     events = [e for e in dead_end_events(path) if abs(e.first[2]) < HALF_RANGES[0]]
