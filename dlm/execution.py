@@ -4,19 +4,17 @@ import torch
 from torch import Tensor
 
 from dlm.inverse_dynamics.layer import Action
-from dlm.simulator import SimulatorSettings, rollout
+from dlm.simulator import SimulatorSettings
+from dlm.simulator.gradient import rollout
 from dlm.tasks import TaskBatch
 
-PUSHING = 0.02
-"""A finger counts as pushing where its force exceeds this share of the object's weight (half the expert's least push)."""
 AWAY = 1.0
 """Height at which idle fingers wait [m]."""
 
 
 def simulate(action: Action, tasks: TaskBatch, simulator: SimulatorSettings) -> Tensor:
     """Object poses (b, t, 3) that follow; differentiable in the action's positions and forces (Thesis 4-CT8)."""
-    pushing = action.forces.detach().norm(dim=-1) > PUSHING * tasks.weight[:, None, None]
-    return rollout(tasks.scenes, action.positions, action.forces, simulator, contact=pushing)
+    return rollout(tasks.scenes, action.positions, action.forces, simulator)
 
 
 def idle_action(tasks: TaskBatch) -> Action:

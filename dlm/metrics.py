@@ -1,11 +1,14 @@
 """How far a simulated motion is from the desired one; every function takes numpy arrays or torch tensors."""
 
-from typing import TypeVar
+import sys
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-import torch
 
-T = TypeVar("T", np.ndarray, torch.Tensor)
+if TYPE_CHECKING:
+    import torch
+
+T = TypeVar("T", np.ndarray, "torch.Tensor")
 
 LEVER = 0.03
 """Arm that turns angles into lengths in the metric [m]."""
@@ -13,15 +16,17 @@ LEVER = 0.03
 
 def motion_error(simulated: T, desired: T) -> T:
     """Entries (x, y, 0.03 m sin theta) of simulated minus desired poses (..., 3) [m]."""
-    sine = torch.sin if isinstance(simulated, torch.Tensor) else np.sin
-    stack = torch.stack if isinstance(simulated, torch.Tensor) else np.stack
-    turn = LEVER * (sine(simulated[..., 2]) - sine(desired[..., 2]))
+    library: Any = sys.modules[
+        type(simulated).__module__.partition(".")[0]
+    ]  # numpy or torch, whichever made it
+    turn = LEVER * (library.sin(simulated[..., 2]) - library.sin(desired[..., 2]))
     move = simulated[..., :2] - desired[..., :2]
-    return stack([move[..., 0], move[..., 1], turn], -1)
+    return library.stack([move[..., 0], move[..., 1], turn], -1)
 
 
 def object_trajectory_loss(simulated: T, desired: T) -> T:
-    """Mean of (100 error)^2 over x, y, 0.03 m sin theta and all T frames, poses (..., T, 3) -> (...) [cm^2]."""
+    """||Sim(p) - r||^2 (Thesis 4-CT10): mean of (100 error)^2 over x, y, 0.03 m sin theta and all T frames,
+    poses (..., T, 3) -> (...) [cm^2]."""
     return ((100 * motion_error(simulated, desired)) ** 2).mean((-2, -1))
 
 

@@ -6,7 +6,6 @@ import io
 import numpy as np
 from PIL import Image
 
-from dlm.execution import PUSHING
 from dlm.inverse_dynamics.layer import Action
 from dlm.simulator import SimulatorSettings
 from dlm.simulator.replay import Replay, replay
@@ -39,9 +38,7 @@ def input_film(tasks: TaskBatch, k: int) -> str:
 def animate(tasks: TaskBatch, k: int, action: Action, simulator: SimulatorSettings) -> str:
     """SVG of task k: desired outline (dashed), simulated object and fingers."""
     task = tasks.samples[k].task
-    forces = action.forces[k].detach().numpy()
-    pushing = np.linalg.norm(forces, axis=-1) > PUSHING * task.weight
-    film = replay(task, action.positions[k].detach().numpy(), forces, simulator, contact=pushing)
+    film = replay(task, action.positions[k].detach().numpy(), action.forces[k].detach().numpy(), simulator)
     return _svg(film, task.body.vertices)
 
 

@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from dlm.simulator.scene import SceneArrays
-from dlm.simulator.settings import Physics
+from dlm.simulator.world import World, vertex_arm
 
 FACET, VERTEX, WALL = 0, 1, 2
 CONTACT = np.dtype(
@@ -24,34 +23,15 @@ REACH = 2e-3
 LEAST_ACTIVATION = 1e-6
 
 
-class View(NamedTuple):
-    """One scene without its padding.  Few arrays: passing one costs as much as ten multiplications."""
+class Moment(NamedTuple):
+    """The start of a step: pose (3,), its cosine and sine, fingers (C, 2), and the velocities without any contact."""
 
-    facets: np.ndarray
-    walls: np.ndarray
-    mass: float
-    inertia: float
-    friction: float
-    stiffness: float
-    gravity: float
-    support: float
-    dt: float
-
-
-@njit(cache=True, error_model="numpy")
-def view(scenes: SceneArrays, b: int) -> View:
-    """Scene b of a batch."""
-    return View(
-        scenes.facets[b, : scenes.vertex_count[b]],
-        scenes.walls[b, : scenes.wall_count[b]],
-        scenes.mass[b],
-        scenes.inertia[b],
-        scenes.friction[b],
-        scenes.stiffness[b],
-        scenes.gravity[b],
-        scenes.support[b],
-        scenes.dt[b],
-    )
+    pose: np.ndarray
+    cs: float
+    sn: float
+    velocity: np.ndarray
+    fingers: np.ndarray
+    finger_velocity: np.ndarray
 
 
 @njit(cache=True, error_model="numpy")
@@ -89,33 +69,20 @@ def nearest(facets: np.ndarray, x: float, y: float) -> tuple[int, int, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def collect(
-    scene: View,
-    physics: Physics,
-    pose: np.ndarray,
-    velocity: np.ndarray,
-    fingers: np.ndarray,
-    finger_velocity: np.ndarray,
-    out: np.ndarray,
-) -> int:
+def collect(world: World, now: Moment, out: np.ndarray) -> int:
     """Fill `out`, an array of CONTACT, with those that may act during the next step; return their number."""
-    cs, sn = np.cos(pose[2]), np.sin(pose[2])
     n = 0
-    for c in range(len(fingers)):
-        dx, dy = fingers[c, 0] - pose[0], fingers[c, 1] - pose[1]
-        bx, by = cs * dx + sn * dy, cs * dy - sn * dx
-        kind, index, _ = nearest(scene.facets, bx, by)
-        n = _add_finger(
-            scene, physics, pose, cs, sn, velocity, fingers, finger_velocity, c, kind, index, out, n
-        )
+    for c in range(len(now.fingers)):
+        dx, dy = now.fingers[c, 0] - now.pose[0], now.fingers[c, 1] - now.pose[1]
+        bx, by = now.cs * dx + now.sn * dy, now.cs * dy - now.sn * dx
+        kind, index, _ = nearest(world.facets, bx, by)
+        n = _add_finger(world, now, c, (kind, index), out, n)
         if kind == FACET:
-            other = _second_facet(scene.facets, index, bx, by)
+            other = _second_facet(world.facets, index, bx, by)
             if other >= 0:
-                n = _add_finger(
-                    scene, physics, pose, cs, sn, velocity, fingers, finger_velocity, c, FACET, other, out, n
-                )
-    for w in range(len(scene.walls)):
-        n = _add_wall(scene, physics, pose, cs, sn, velocity, w, out, n)
+                n = _add_finger(world, now, c, (FACET, other), out, n)
+    for w in range(len(world.walls)):
+        n = _add_wall(world, now, w, out, n)
     return n
 
 
@@ -143,27 +110,15 @@ def _acts(gap: float, approach: float, kappa: float) -> bool:
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _add_finger(
-    scene: View,
-    physics: Physics,
-    pose: np.ndarray,
-    cs: float,
-    sn: float,
-    velocity: np.ndarray,
-    fingers: np.ndarray,
-    finger_velocity: np.ndarray,
-    c: int,
-    kind: int,
-    index: int,
-    out: np.ndarray,
-    n: int,
-) -> int:
-    """Contact of finger c with one feature, unless it is out of reach."""
-    facet = scene.facets[index]
-    px, py = fingers[c, 0], fingers[c, 1]
-    ax, ay = pose[0] + cs * facet.x - sn * facet.y, pose[1] + sn * facet.x + cs * facet.y
+def _add_finger(world: World, now: Moment, c: int, feature: tuple[int, int], out: np.ndarray, n: int) -> int:
+    """Contact of finger c with a feature (kind, index), unless it is out of reach."""
+    kind, index = feature
+    facet = world.facets[index]
+    px, py = now.fingers[c, 0], now.fingers[c, 1]
+    ax = now.pose[0] + now.cs * facet.x - now.sn * facet.y
+    ay = now.pose[1] + now.sn * facet.x + now.cs * facet.y
     if kind == FACET:
-        nx, ny = cs * facet.ox - sn * facet.oy, sn * facet.ox + cs * facet.oy
+        nx, ny = vertex_arm(facet.ox, facet.oy, now.cs, now.sn)
         distance = (px - ax) * nx + (py - ay) * ny
         qx, qy = px - distance * nx, py - distance * ny
     else:
@@ -171,40 +126,31 @@ def _add_finger(
         reach = np.sqrt((px - ax) ** 2 + (py - ay) ** 2)
         nx, ny = sign * (px - ax) / reach, sign * (py - ay) / reach
         distance, qx, qy = sign * reach, ax, ay
-    gap = distance - physics.radius
-    ux = velocity[0] - velocity[2] * (qy - pose[1]) - finger_velocity[c, 0]
-    uy = velocity[1] + velocity[2] * (qx - pose[0]) - finger_velocity[c, 1]
-    if not _acts(gap, scene.dt / physics.substeps * (nx * ux + ny * uy), physics.kappa):
+    gap = distance - world.radius
+    ux = now.velocity[0] - now.velocity[2] * (qy - now.pose[1]) - now.finger_velocity[c, 0]
+    uy = now.velocity[1] + now.velocity[2] * (qx - now.pose[0]) - now.finger_velocity[c, 1]
+    if not _acts(gap, world.h * (nx * ux + ny * uy), world.kappa):
         return n
     contact = out[n]
     contact.kind, contact.finger, contact.feature, contact.wall = kind, c, index, -1
     # The finger pushes the object inwards, against the outward normal.
     contact.nx, contact.ny, contact.x, contact.y = -nx, -ny, qx, qy
-    contact.gap, contact.friction = gap, scene.friction
+    contact.gap, contact.friction = gap, world.friction
     return n + 1
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _add_wall(
-    scene: View,
-    physics: Physics,
-    pose: np.ndarray,
-    cs: float,
-    sn: float,
-    velocity: np.ndarray,
-    w: int,
-    out: np.ndarray,
-    n: int,
-) -> int:
+def _add_wall(world: World, now: Moment, w: int, out: np.ndarray, n: int) -> int:
     """The lowest vertices over wall w."""
-    wall, base, h = scene.walls[w], n, scene.dt / physics.substeps
+    wall, base = world.walls[w], n
     nx, ny = wall.nx, wall.ny
-    for k in range(len(scene.facets)):
-        vx, vy = scene.facets[k].x, scene.facets[k].y
-        rx, ry = cs * vx - sn * vy, sn * vx + cs * vy
-        gap = (pose[0] + rx - wall.x) * nx + (pose[1] + ry - wall.y) * ny
-        opening = nx * (velocity[0] - velocity[2] * ry) + ny * (velocity[1] + velocity[2] * rx)
-        if not _acts(gap, -h * opening, physics.kappa):
+    for k in range(len(world.facets)):
+        rx, ry = vertex_arm(world.facets[k].x, world.facets[k].y, now.cs, now.sn)
+        gap = (now.pose[0] + rx - wall.x) * nx + (now.pose[1] + ry - wall.y) * ny
+        opening = nx * (now.velocity[0] - now.velocity[2] * ry) + ny * (
+            now.velocity[1] + now.velocity[2] * rx
+        )
+        if not _acts(gap, -world.h * opening, world.kappa):
             continue
         at = n
         if n - base == WALL_POINTS:
@@ -218,6 +164,6 @@ def _add_wall(
             n += 1
         contact = out[at]
         contact.kind, contact.finger, contact.feature, contact.wall = WALL, -1, k, w
-        contact.nx, contact.ny, contact.x, contact.y = nx, ny, pose[0] + rx, pose[1] + ry
+        contact.nx, contact.ny, contact.x, contact.y = nx, ny, now.pose[0] + rx, now.pose[1] + ry
         contact.gap, contact.friction = gap, wall.friction
     return n

@@ -5,22 +5,12 @@ from typing import Any
 import numpy as np
 import torch
 
-from dlm.simulator.adjoint import implicit_batch
 from dlm.simulator.differences import difference_batch
-from dlm.simulator.rollout import execute_batch
+from dlm.simulator.implicit import implicit_batch
+from dlm.simulator.rollout import Plans, execute_batch
 from dlm.simulator.scene import SceneBatch
 from dlm.simulator.settings import SimulatorSettings
 from expert.world.values import require
-
-LOADED_SHARE = 1e-6
-"""Without contact flags a finger counts as loaded where its force exceeds this share of the object's weight."""
-
-
-def loaded_flags(batch: SceneBatch, forces: np.ndarray) -> np.ndarray:
-    """Flags (B, T, C): the finger's force (B, T, C, 2) is not zero."""
-    weight = np.maximum(batch.arrays.mass * 9.81, 1e-300)[:, None, None]
-    with np.errstate(invalid="ignore", over="ignore"):
-        return np.abs(forces).max(axis=-1) > LOADED_SHARE * weight
 
 
 class _Rollout(torch.autograd.Function):
@@ -37,9 +27,9 @@ class _Rollout(torch.autograd.Function):
         settings: SimulatorSettings,
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """Poses (B, T, 3), float64, and status (B,)."""
-        p, f = _array(positions), _array(forces)
-        poses, ok = execute_batch(batch.arrays, settings.physics, settings.layers, p, f, loaded, start)
-        ctx.problem = batch, p, f, loaded, start, settings
+        plans = Plans(_array(positions), _array(forces), loaded, start)
+        poses, ok = execute_batch(batch.arrays, plans, settings.numbers)
+        ctx.problem = batch, plans, settings
         ctx.dtypes = positions.dtype, forces.dtype
         ok_tensor = torch.from_numpy(ok)
         ctx.mark_non_differentiable(ok_tensor)
@@ -48,14 +38,13 @@ class _Rollout(torch.autograd.Function):
     @staticmethod
     def backward(ctx: Any, *adjoints: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
         """Gradients of positions and forces, by the settings' method."""
-        batch, p, f, loaded, start, settings = ctx.problem
-        common = batch.arrays, settings.physics, settings.layers, p, f, loaded, start, _array(adjoints[0])
-        if settings.gradient == "implicit":
-            d_positions, d_forces = implicit_batch(*common)
-        else:
-            d_positions, d_forces = difference_batch(*common, settings.difference_step)
-        to_p, to_f = ctx.dtypes
-        return torch.from_numpy(d_positions).to(to_p), torch.from_numpy(d_forces).to(to_f), *[None] * 4
+        batch, plans, settings = ctx.problem
+        method = implicit_batch if settings.gradient == "implicit" else difference_batch
+        gradients = method(batch.arrays, plans, settings.numbers, _array(adjoints[0]))
+        to_positions, to_forces = (
+            torch.from_numpy(g).to(d) for g, d in zip(gradients, ctx.dtypes, strict=True)
+        )
+        return to_positions, to_forces, *[None] * 4
 
 
 def rollout(
@@ -66,11 +55,11 @@ def rollout(
     contact: torch.Tensor | np.ndarray | None = None,
     start: np.ndarray | None = None,
 ) -> torch.Tensor:
-    """Object poses (B, T, 3), float64, at the knots when plans are executed (Thesis 4-CT8).
+    """Object poses (B, T, 3), float64, at the knots when plans are executed.
 
     positions, forces: (B, T, C, 2) [m], [N on the object], world frame.  contact (B, T, C): the finger pushes from this
-    knot on; by default where its force is not zero.  start (B, 3): first poses, by default the desired ones.
-    Differentiable in positions and forces.  See `rollout_with_status` for plans that are not finite.
+    knot on; by default where its force is that of a push (`SceneBatch.loaded`).  start (B, 3): first poses, by default the
+    desired ones.  Differentiable in positions and forces.  See `rollout_with_status` for plans that are not finite.
     """
     return rollout_with_status(batch, positions, forces, settings, contact, start)[0]
 
@@ -92,7 +81,7 @@ def rollout_with_status(
     fits = positions.ndim == 4 and positions.shape[:2] == (B, T) and positions.shape[3] == 2
     require(fits, "positions", f"shape ({B}, {T}, fingers, 2)", tuple(positions.shape))
     require(positions.shape == forces.shape, "forces", f"shape {tuple(positions.shape)}", tuple(forces.shape))
-    flags = loaded_flags(batch, _array(forces)) if contact is None else np.asarray(contact, dtype=bool)
+    flags = batch.loaded(_array(forces)) if contact is None else np.asarray(contact, dtype=bool)
     require(flags.shape == positions.shape[:3], "contact", f"shape {tuple(positions.shape[:3])}", flags.shape)
     first = batch.desired[:, 0].copy() if start is None else np.array(start, dtype=float)
     require(first.shape == (B, 3), "start", f"shape ({B}, 3)", first.shape)

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dlm.simulator.contact import view
 from dlm.simulator.mujoco import MujocoReplay, command_model, replay_model
-from dlm.simulator.rollout import advance, motion_for
+from dlm.simulator.rollout import Run, advance, motion_for
 from dlm.simulator.scene import Scene, SceneBatch
 from dlm.simulator.settings import SimulatorSettings
 from dlm.simulator.step import work_for
+from dlm.simulator.world import world_of
 from expert.geometry.pose import Array, moved_origin
 from expert.problems.grasp import GraspProblem
 from expert.world.environment import Environment
@@ -51,13 +51,13 @@ def replay_grasp(
     scene, centroid = _scene(problem, len(path), friction, slow)
     commands = _commands(readonly(path, (None, None, 2), "path"), slow.substeps)
     batch = SceneBatch.of([scene])
-    row, work = view(batch.arrays, 0), work_for(path.shape[1], batch.arrays.walls.shape[1])
+    world, fingers = world_of(batch.arrays, 0, slow.settings.numbers), path.shape[1]
+    run = Run(motion_for(len(commands), fingers), commands, work_for(fingers, batch.arrays.walls.shape[1]))
     poses = np.empty((len(starts), len(path), 3))
     for m, start in enumerate(moved_origin(readonly(starts, (None, 3), "starts"), centroid)):
-        motion = motion_for(len(commands), path.shape[1])
-        motion.poses[0], motion.fingers[0], motion.velocities[0] = start, commands[0], 0
-        advance(row, slow.settings.physics, commands, 0, motion, work)
-        poses[m] = motion.poses[:: slow.substeps]
+        run.motion.poses[0], run.motion.fingers[0], run.motion.velocities[0] = start, commands[0], 0
+        advance(world, run, 0)
+        poses[m] = run.motion.poses[:: slow.substeps]
     return moved_origin(poses, -centroid)
 
 

@@ -4,8 +4,12 @@ With y = A P + c: y_n >= 0, P_n >= 0, y_n P_n = 0; y_t = 0 where |P_t| < mu P_n,
 A few projected Gauss-Seidel sweeps guess the state of every contact; an active-set Newton method makes it exact.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
+
+from dlm.simulator.contact import CONTACT
 
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS = 0, 1, 2, 3
 """State of a contact: P = 0; y = 0; y_n = 0 and P_t = +mu P_n or -mu P_n."""
@@ -20,27 +24,51 @@ ROW = np.dtype([(name, "f8") for name in ("x", "y", "turn", "c", "P", "rhs", "sa
 """Row of the problem: direction and lever (the contact Jacobian), c, impulse, and scratch for the linear system."""
 
 
+class Problem(NamedTuple):
+    """Contacts (n,) of CONTACT, whose `state` holds the active set, their rows (2 n,) of ROW, A, and B for scratch (2 n, 2 n).
+
+    All may be longer: functions take the number n of contacts first.
+    """
+
+    contacts: np.ndarray
+    rows: np.ndarray
+    A: np.ndarray
+    B: np.ndarray
+
+
 @njit(cache=True, error_model="numpy")
-def solve_contacts(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray, B: np.ndarray) -> bool:
-    """Solve for the impulses with n contacts; contacts.state holds the active set.  False where only the sweeps' answer was found."""
+def problem_for(size: int) -> Problem:
+    """Memory for at most so many contacts."""
+    return Problem(
+        np.zeros(size, CONTACT),
+        np.zeros(2 * size, ROW),
+        np.zeros((2 * size, 2 * size)),
+        np.zeros((2 * size, 2 * size)),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def solve_contacts(n: int, problem: Problem) -> bool:
+    """Solve for the impulses.  False where only the sweeps' answer was found."""
+    rows = problem.rows
     for r in range(2 * n):
         rows[r].P = 0
     for sweeps in SWEEPS:
-        sweep(n, contacts, rows, A, sweeps)
+        sweep(n, problem, sweeps)
         for r in range(2 * n):
             rows[r].saved = rows[r].P
-        if newton(n, contacts, rows, A, B):
+        if newton(n, problem):
             return True
         for r in range(2 * n):
             rows[r].P = rows[r].saved
-    guess_states(n, contacts, rows)
+    guess_states(n, problem)
     return False
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def sweep(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray, sweeps: int) -> None:
+def sweep(n: int, problem: Problem, sweeps: int) -> None:
     """Projected Gauss-Seidel, contact by contact."""
-    m = 2 * n
+    m, contacts, rows, A = 2 * n, problem.contacts, problem.rows, problem.A
     for r in range(m):
         rows[r].inverse = 1 / A[r, r]
     for _ in range(sweeps):
@@ -58,8 +86,9 @@ def sweep(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray, sweeps:
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def guess_states(n: int, contacts: np.ndarray, rows: np.ndarray) -> None:
+def guess_states(n: int, problem: Problem) -> None:
     """Read the states off the impulses."""
+    contacts, rows = problem.contacts, problem.rows
     for i in range(n):
         normal, tangential = rows[2 * i].P, rows[2 * i + 1].P
         limit = contacts[i].friction * normal
@@ -74,30 +103,30 @@ def guess_states(n: int, contacts: np.ndarray, rows: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def newton(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray, B: np.ndarray) -> bool:
+def newton(n: int, problem: Problem) -> bool:
     """Solve the linear system of the guessed states and correct them until they agree with their solution."""
-    guess_states(n, contacts, rows)
+    rows = problem.rows
+    guess_states(n, problem)
     for _ in range(NEWTON):
-        size = reduced_system(n, contacts, rows, A, B, False)
+        size = reduced_system(n, problem, False)
         for r in range(size):
             rows[r].rhs = -rows[r].rhs
-        if not solve_linear(B, rows, size):
+        if not solve_linear(problem.B, rows, size):
             return False
-        expand(n, contacts, rows)
-        if not _correct_states(n, contacts, rows, A):
+        expand(n, problem)
+        if not _correct_states(n, problem):
             return True
     return False
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def reduced_system(
-    n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray, B: np.ndarray, transposed: bool
-) -> int:
+def reduced_system(n: int, problem: Problem, transposed: bool) -> int:
     """Rows and columns of the active set into B, its part of c into the right-hand sides; return the size.
 
     A closed contact has a normal row; a sticking one has a tangential row too.  The column of a slipping contact
     carries its friction: A_n +- mu A_t.
     """
+    contacts, rows, A, B = problem.contacts, problem.rows, problem.A, problem.B
     row = 0
     for i in range(n):
         for part in range(ROWS[contacts[i].state]):
@@ -123,8 +152,9 @@ def reduced_system(
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def expand(n: int, contacts: np.ndarray, rows: np.ndarray) -> None:
+def expand(n: int, problem: Problem) -> None:
     """Impulses P from the reduced solution in the right-hand sides."""
+    contacts, rows = problem.contacts, problem.rows
     row = 0
     for i in range(n):
         state = contacts[i].state
@@ -143,9 +173,9 @@ def expand(n: int, contacts: np.ndarray, rows: np.ndarray) -> None:
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _correct_states(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarray) -> bool:
+def _correct_states(n: int, problem: Problem) -> bool:
     """Flip the states that contradict the impulses; return whether any did."""
-    m = 2 * n
+    m, contacts, rows = 2 * n, problem.contacts, problem.rows
     impulse, speed = 0.0, 0.0
     for r in range(m):
         impulse = max(impulse, abs(rows[r].P))
@@ -156,7 +186,7 @@ def _correct_states(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarra
         state, normal, tangential = contacts[i].state, rows[2 * i].P, rows[2 * i + 1].P
         new = state
         if state == OPEN:
-            if _velocity(rows, A, 2 * i, m) < -speed_tolerance:
+            if relative_velocity(n, problem, 2 * i) < -speed_tolerance:
                 new = STICK
         elif normal < -impulse_tolerance:
             new = OPEN
@@ -167,7 +197,7 @@ def _correct_states(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarra
             elif tangential < -limit:
                 new = SLIP_MINUS
         elif contacts[i].friction > 0:
-            slip = _velocity(rows, A, 2 * i + 1, m)
+            slip = relative_velocity(n, problem, 2 * i + 1)
             if (state == SLIP_PLUS and slip > speed_tolerance) or (
                 state == SLIP_MINUS and slip < -speed_tolerance
             ):
@@ -178,10 +208,11 @@ def _correct_states(n: int, contacts: np.ndarray, rows: np.ndarray, A: np.ndarra
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _velocity(rows: np.ndarray, A: np.ndarray, r: int, m: int) -> float:
-    y = rows[r].c
-    for s in range(m):
-        y += A[r, s] * rows[s].P
+def relative_velocity(n: int, problem: Problem, r: int) -> float:
+    """y = A P + c in row r."""
+    y = problem.rows[r].c
+    for s in range(2 * n):
+        y += problem.A[r, s] * problem.rows[s].P
     return y
 
 

@@ -8,11 +8,20 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from dlm.simulator.contact import View, view
-from dlm.simulator.execution import Commands, command, plan_commands
+from dlm.simulator.commands import Commands, command
+from dlm.simulator.execution import plan_commands
 from dlm.simulator.scene import SceneArrays
-from dlm.simulator.settings import Layers, Physics
 from dlm.simulator.step import Work, solve_step, work_for
+from dlm.simulator.world import State, World, world_of
+
+
+class Plans(NamedTuple):
+    """What B scenes are asked to do: positions and forces (B, T, C, 2), flags loaded (B, T, C), first poses start (B, 3)."""
+
+    positions: np.ndarray
+    forces: np.ndarray
+    loaded: np.ndarray
+    start: np.ndarray
 
 
 class Motion(NamedTuple):
@@ -28,6 +37,25 @@ class Motion(NamedTuple):
     near: np.ndarray
 
 
+class Run(NamedTuple):
+    """Memory of one scene's execution: its motion, the commands (S + 1, C, 2) that it follows, and scratch."""
+
+    motion: Motion
+    commands: np.ndarray
+    work: Work
+
+
+class Item(NamedTuple):
+    """One scene of a batch with its plan: desired path (T, 3), positions, forces (T, C, 2), loaded (T, C), start (3,)."""
+
+    world: World
+    path: np.ndarray
+    positions: np.ndarray
+    forces: np.ndarray
+    loaded: np.ndarray
+    start: np.ndarray
+
+
 @njit(cache=True, error_model="numpy")
 def motion_for(samples: int, fingers: int) -> Motion:
     """Empty states."""
@@ -41,31 +69,66 @@ def motion_for(samples: int, fingers: int) -> Motion:
 
 
 @njit(cache=True, error_model="numpy")
-def advance(
-    scene: View, physics: Physics, commands: np.ndarray, start: int, motion: Motion, work: Work
-) -> bool:
-    """Continue `motion` from substep `start` under commands (S + 1, C, 2).
+def run_for(scenes: SceneArrays, plans: Plans, settings: np.record) -> Run:
+    """Memory for any scene of a batch."""
+    _, T, C = plans.loaded.shape
+    samples = (T - 1) * settings.substeps + 1
+    return Run(motion_for(samples, C), np.zeros((samples, C, 2)), work_for(C, scenes.walls.shape[1]))
+
+
+@njit(cache=True, error_model="numpy")
+def item_of(scenes: SceneArrays, plans: Plans, b: int, settings: np.record) -> Item:
+    """Scene and plan b."""
+    world, path = world_of(scenes, b, settings), scenes.path[b]
+    return Item(world, path, plans.positions[b], plans.forces[b], plans.loaded[b], plans.start[b])
+
+
+@njit(cache=True, error_model="numpy")
+def table_of(item: Item, settings: np.record) -> Commands:
+    """How the commands depend on the plan."""
+    return plan_commands(item.world, item.path, item.positions, item.loaded, settings)
+
+
+@njit(cache=True, error_model="numpy")
+def execute(item: Item, table: Commands, run: Run) -> bool:
+    """Commands and motion of one plan; False where numbers overflow."""
+    command(table, item.positions, item.forces, item.world.stiffness, run.commands)
+    start_motion(item, table, run.motion)
+    return advance(item.world, run, 0)
+
+
+@njit(cache=True, error_model="numpy")
+def start_motion(item: Item, table: Commands, motion: Motion) -> None:
+    """Object at rest at its first pose, fingers where the plan has them."""
+    motion.poses[0], motion.velocities[0] = item.start, 0
+    command(table, item.positions, item.forces, np.inf, motion.fingers[:1])
+
+
+@njit(cache=True, error_model="numpy")
+def advance(world: World, run: Run, start: int) -> bool:
+    """Continue the motion from substep `start` under the run's commands.
 
     Returns False, and holds the last finite state for good, where numbers overflow.
     """
-    h = scene.dt / physics.substeps
+    motion, commands, work = run
+    velocity, finger_velocity, contacts = work.velocity, work.finger_velocity, work.problem.contacts
+    poses, velocities, fingers, exact, near = motion
     for i in range(start, len(commands) - 1):
-        q, v, p = motion.poses[i], motion.velocities[i], motion.fingers[i]
-        n, motion.exact[i] = solve_step(scene, physics, q, v, p, commands[i + 1], work)
-        for c in range(len(p)):
-            motion.near[i, c] = False
+        n, exact[i] = solve_step(world, State(poses[i], velocities[i], fingers[i]), commands[i + 1], work)
+        for c in range(near.shape[1]):
+            near[i, c] = False
         for k in range(n):
-            if work.contacts[k].finger >= 0:
-                motion.near[i, work.contacts[k].finger] = True
+            if contacts[k].finger >= 0:
+                near[i, contacts[k].finger] = True
         for d in range(3):
-            motion.velocities[i + 1, d] = work.velocity[d]
-            motion.poses[i + 1, d] = q[d] + h * work.velocity[d]
-        for c in range(len(p)):
+            velocities[i + 1, d] = velocity[d]
+            poses[i + 1, d] = poses[i, d] + world.h * velocity[d]
+        for c in range(near.shape[1]):
             for d in range(2):
-                motion.fingers[i + 1, c, d] = p[c, d] + h * work.finger_velocity[c, d]
+                fingers[i + 1, c, d] = fingers[i, c, d] + world.h * finger_velocity[c, d]
         if not finite(motion, i + 1):
             for j in range(i + 1, len(commands)):
-                motion.poses[j], motion.velocities[j], motion.fingers[j] = q, v, p
+                poses[j], velocities[j], fingers[j] = poses[i], velocities[i], fingers[i]
             return False
     return True
 
@@ -82,47 +145,24 @@ def finite(motion: Motion, i: int) -> bool:
 
 
 @njit(cache=True, error_model="numpy")
-def start_motion(table: Commands, positions: np.ndarray, forces: np.ndarray, motion: Motion) -> None:
-    """Object at rest at its first pose, fingers where the plan has them."""
-    command(table, positions, forces, np.inf, motion.fingers[:1])
-    motion.velocities[0] = 0
-
-
-@njit(cache=True, error_model="numpy")
-def acceptable(positions: np.ndarray, forces: np.ndarray) -> bool:
+def acceptable(item: Item) -> bool:
     """Whether a plan is made of finite numbers that leave room to compute with."""
-    return np.abs(positions).max() < 1e100 and np.abs(forces).max() < 1e100
+    return np.abs(item.positions).max() < 1e100 and np.abs(item.forces).max() < 1e100
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def execute_batch(
-    scenes: SceneArrays,
-    physics: Physics,
-    layers: Layers,
-    positions: np.ndarray,
-    forces: np.ndarray,
-    loaded: np.ndarray,
-    start: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Poses at the knots (B, T, 3) and status (B,) of plans (B, T, C, 2), from start poses (B, 3).
+def execute_batch(scenes: SceneArrays, plans: Plans, settings: np.record) -> tuple[np.ndarray, np.ndarray]:
+    """Poses at the knots (B, T, 3) and status (B,).
 
     A plan that is not finite leaves its object where it is and gets status False.
     """
-    B, T, C = loaded.shape
+    B, T, _ = plans.loaded.shape
     poses, ok = np.zeros((B, T, 3)), np.zeros(B, np.bool_)
-    work = work_for(C, scenes.walls.shape[1])
-    samples = (T - 1) * layers.substeps + 1
-    motion, commands = motion_for(samples, C), np.zeros((samples, C, 2))
+    run = run_for(scenes, plans, settings)
     for b in range(B):
-        poses[b, :] = start[b]
-        if not acceptable(positions[b], forces[b]):
-            continue
-        scene = view(scenes, b)
-        table = plan_commands(scene, scenes.path[b], positions[b], loaded[b], layers)
-        command(table, positions[b], forces[b], scene.stiffness, commands)
-        motion.poses[0] = start[b]
-        start_motion(table, positions[b], forces[b], motion)
-        ok[b] = advance(scene, physics, commands, 0, motion, work)
-        for t in range(T):
-            poses[b, t] = motion.poses[t * layers.substeps]
+        item = item_of(scenes, plans, b, settings)
+        poses[b, :] = item.start
+        if acceptable(item):
+            ok[b] = execute(item, table_of(item, settings), run)
+            poses[b] = run.motion.poses[:: settings.substeps]
     return poses, ok

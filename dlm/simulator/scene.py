@@ -17,6 +17,9 @@ from expert.world.walls import HalfPlane
 
 STIFFNESS_PER_MASS = 1e5
 """Finger stiffness over the object's mass [N/m per kg]: planned forces of m g deflect a finger by 0.1 mm."""
+PUSHING = 0.02
+"""A finger counts as loaded where its force exceeds this share of the object's weight: half the least push of the expert's
+plans, and far above what solvers and networks leave of a zero."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,8 +62,8 @@ class SceneArrays(NamedTuple):
     """B scenes as padded arrays, the compiled kernels' view.
 
     vertex_count, wall_count (B,); facets (B, V) of FACET_ROW; walls (B, W) of WALL_ROW; gravity (B,): along -y in the
-    sagittal plane, 0 in the transverse one; support (B,): Coulomb force per vertex of the support plane [N];
-    path (B, T, 3): desired poses at the knots.
+    sagittal plane, 0 in the transverse one; weight (B,): m g in either; support (B,): Coulomb force per vertex of the
+    support plane [N]; path (B, T, 3): desired poses at the knots.
     """
 
     vertex_count: np.ndarray
@@ -70,6 +73,7 @@ class SceneArrays(NamedTuple):
     friction: np.ndarray
     stiffness: np.ndarray
     gravity: np.ndarray
+    weight: np.ndarray
     support: np.ndarray
     wall_count: np.ndarray
     walls: np.ndarray
@@ -110,6 +114,11 @@ class SceneBatch:
         """Desired poses (B, T, 3)."""
         return self.arrays.path
 
+    def loaded(self, forces: np.ndarray) -> np.ndarray:
+        """Flags (B, T, C): the finger's force (B, T, C, 2) is that of a push.  Forces that are not finite are none."""
+        with np.errstate(invalid="ignore", over="ignore"):
+            return np.hypot(forces[..., 0], forces[..., 1]) > PUSHING * self.arrays.weight[:, None, None]
+
     def without_friction(self) -> "SceneBatch":
         """The same scenes with frictionless fingers and walls."""
         walls = self.arrays.walls.copy()
@@ -128,6 +137,7 @@ def _arrays(scenes: list[Scene]) -> SceneArrays:
         friction=np.array([s.friction for s in scenes], dtype=float),
         stiffness=np.array([s.stiffness for s in scenes], dtype=float),
         gravity=np.array([s.environment.gravity * (s.environment.plane == "sagittal") for s in scenes]),
+        weight=np.array([s.body.mass * s.environment.gravity for s in scenes]),
         support=np.array([_support_force(s) for s in scenes]),
         wall_count=np.array([len(rows) for rows in wall_rows]),
         walls=_padded(wall_rows),

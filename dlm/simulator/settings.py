@@ -1,7 +1,7 @@
 """How to simulate and how to execute a plan; every layer of the execution can be switched off by itself."""
 
-from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal
 
 import numpy as np
 
@@ -10,38 +10,12 @@ from expert.world.values import require
 Gradient = Literal["finite_difference", "implicit"]
 
 
-class Physics(NamedTuple):
-    """What the time stepper needs of the settings."""
-
-    substeps: int
-    radius: float
-    damping: float
-    regularization: float
-    kappa: float
-
-
-class Layers(NamedTuple):
-    """What the execution layer needs of the settings."""
-
-    substeps: int
-    radius: float
-    screw: bool
-    pchip: bool
-    compensation: bool
-    approach: float
-    release: float
-    lift_off: float
-    parking: float
-    rolling: bool
-    handover: bool
-
-
 @dataclass(frozen=True, kw_only=True)
 class Execution:
     """From a plan at the knots to finger commands at every substep.
 
     material_point: a finger in contact follows the object's surface along a constant-twist screw (else straight lines).
-    timing: motion law along the path; `pchip` starts and ends at rest, `linear` has constant speed between knots.
+    eased: motions start and end at rest, by monotone cubic timing along the path (else constant speed between knots).
     compensation: commands lead the finger by force / stiffness, so that its spring exerts the planned force.
     approach, release: share of an interval by which a finger arrives early and by which it lets go late.
     lift_off [m]: bump along the facet normal on the way from and to a facet.
@@ -51,7 +25,7 @@ class Execution:
     """
 
     material_point: bool = True
-    timing: Literal["pchip", "linear"] = "pchip"
+    eased: bool = True
     compensation: bool = True
     approach: float = 0.4
     release: float = 0.4
@@ -61,7 +35,6 @@ class Execution:
     handover: bool = True
 
     def __post_init__(self) -> None:
-        require(self.timing in ("pchip", "linear"), "execution.timing", "pchip or linear", self.timing)
         for name in ("approach", "release"):
             value = getattr(self, name)
             require(0 <= value < 0.5, f"execution.{name}", "a fraction in [0, 0.5)", value)
@@ -92,43 +65,32 @@ class SimulatorSettings:
     execution: Execution = field(default_factory=Execution)
 
     def __post_init__(self) -> None:
-        require(self.substeps >= 1, "simulator.substeps", "at least 1", self.substeps)
-        radius, damping, step = self.finger_radius, self.damping, self.difference_step
-        require(0 < radius < np.inf, "simulator.finger_radius", "a positive length in metres", radius)
-        require(0 <= damping < np.inf, "simulator.damping", "a number >= 0", damping)
-        require(
-            0 < self.regularization < 1, "simulator.regularization", "a share in (0, 1)", self.regularization
-        )
+        for name, low, high, expected in (
+            ("substeps", 1, np.inf, "at least 1"),
+            ("finger_radius", TINY, np.inf, "a positive length in metres"),
+            ("damping", 0, np.inf, "a number >= 0"),
+            ("regularization", TINY, 1, "a share in (0, 1)"),
+            ("difference_step", TINY, np.inf, "a positive length in metres"),
+        ):
+            value = getattr(self, name)
+            require(low <= value < high, f"simulator.{name}", expected, value)
         require(self.kappa > 0, "simulator.kappa", "a positive number, inf for rigid contact", self.kappa)
-        require(
-            self.gradient in ("finite_difference", "implicit"),
-            "simulator.gradient",
-            "finite_difference or implicit",
-            self.gradient,
-        )
-        require(0 < step < np.inf, "simulator.difference_step", "a positive length in metres", step)
+        methods = ("finite_difference", "implicit")
+        require(self.gradient in methods, "simulator.gradient", " or ".join(methods), self.gradient)
 
     @property
-    def physics(self) -> Physics:
-        """The part that the time stepper compiles against."""
-        return Physics(
-            self.substeps, self.finger_radius, self.damping, self.regularization, float(self.kappa)
-        )
+    def numbers(self) -> Any:
+        """All numbers and switches of both classes as one record of dtype NUMBERS, for compiled code."""
+        parts = (self, self.execution)
+        values = [getattr(part, name) for part in parts for name, _ in _numbers(type(part))]
+        return np.array(tuple(values), NUMBERS)[()]
 
-    @property
-    def layers(self) -> Layers:
-        """The part that the execution layer compiles against."""
-        e = self.execution
-        return Layers(
-            self.substeps,
-            self.finger_radius,
-            e.material_point,
-            e.timing == "pchip",
-            e.compensation,
-            float(e.approach),
-            float(e.release),
-            float(e.lift_off),
-            float(e.parking),
-            e.rolling,
-            e.handover,
-        )
+
+TINY = np.finfo(float).tiny
+
+
+def _numbers(settings: type) -> list[tuple[str, Any]]:
+    return [(f.name, f.type) for f in fields(settings) if f.type in (bool, int, float)]
+
+
+NUMBERS = np.dtype(_numbers(SimulatorSettings) + _numbers(Execution), align=True)

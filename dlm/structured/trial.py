@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import torch
 
-from dlm.execution import PUSHING
 from dlm.metrics import object_trajectory_loss
-from dlm.simulator import Scene, SceneBatch, SimulatorSettings, rollout
+from dlm.simulator import Scene, SceneBatch, SimulatorSettings
+from dlm.simulator.gradient import rollout
 from dlm.structured.calibration import inset
 from expert.geometry.pose import Array
 from expert.problems.contact import ContactTask, Plan
@@ -46,8 +46,7 @@ class Trial:
         positions, forces = (
             torch.from_numpy(np.repeat(x[None], len(scenes), 0)) for x in (plan.positions, plan.forces)
         )
-        pushing = forces.norm(dim=-1) > PUSHING * task.weight
-        poses = rollout(batch, positions, forces, self.simulator, contact=pushing, start=start).numpy()
+        poses = rollout(batch, positions, forces, self.simulator, start=start).numpy()
         first, *others = object_trajectory_loss(poses, task.trajectory.poses[None])
         risk = 0.5 * (first + np.max(others))
         return float(risk) if np.isfinite(risk) else np.inf

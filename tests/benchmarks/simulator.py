@@ -23,14 +23,12 @@ from rich.progress import track
 from rich.table import Table
 
 from dlm.metrics import object_trajectory_loss, rotation_error, translation_error, within
-from dlm.simulator import Execution, Scene, SceneBatch, SimulatorSettings, replay, rollout
-from dlm.simulator.contact import View, view
-from dlm.simulator.execution import command, plan_commands
-from dlm.simulator.gradient import loaded_flags
+from dlm.simulator import Execution, Scene, SceneBatch, SimulatorSettings, replay
+from dlm.simulator.gradient import rollout
 from dlm.simulator.mujoco import replay_in_mujoco
-from dlm.simulator.rollout import Motion, advance, motion_for, start_motion
-from dlm.simulator.settings import Physics
-from dlm.simulator.step import Work, solve_step, work_for
+from dlm.simulator.rollout import Plans, Run, execute, item_of, run_for, table_of
+from dlm.simulator.step import solve_step
+from dlm.simulator.world import State, World
 from expert.geometry.pose import Array
 from expert.world.environment import Environment
 from tests.support.expert_plans import Planned, planned_tasks, transverse_tasks
@@ -42,7 +40,7 @@ ROLLOUT_BAR, DIFFERENCE_BAR, IMPLICIT_BAR = 0.1, 5.0, 2.0
 ABLATIONS = {
     "all on": Execution(),
     "straight lines": Execution(material_point=False),
-    "constant speed": Execution(timing="linear"),
+    "constant speed": Execution(eased=False),
     "no compensation": Execution(compensation=False),
     "no approach, no release": Execution(approach=0, release=0),
     "no handover": Execution(handover=False),
@@ -50,7 +48,7 @@ ABLATIONS = {
     "no parking": Execution(parking=0),
     "all off": Execution(
         material_point=False,
-        timing="linear",
+        eased=False,
         compensation=False,
         approach=0,
         release=0,
@@ -184,21 +182,16 @@ def reference_gradient(
     scene: Scene, positions: Array, forces: Array, weights: Array, step: float
 ) -> tuple[Array, np.ndarray]:
     """Central differences with respect to positions and force / stiffness, and where no contact changed its state."""
-    batch, settings = SceneBatch.of([scene]), SimulatorSettings()
-    loaded = loaded_flags(batch, forces[None])[0]
-    s, plan = view(batch.arrays, 0), np.stack([positions, forces / scene.stiffness]).copy()
-    table_of = lambda p: plan_commands(s, batch.desired[0], p, loaded, settings.layers)  # noqa: E731
-    samples, C = (len(positions) - 1) * settings.substeps + 1, positions.shape[1]
+    batch, numbers = SceneBatch.of([scene]), SimulatorSettings().numbers
+    loaded, start = batch.loaded(forces[None]), batch.desired[:, 0].copy()
+    plan = np.stack([positions, forces / scene.stiffness])
 
     def run(values: Array) -> tuple[float, np.ndarray]:
-        table, commands, motion = table_of(values[0]), np.zeros((samples, C, 2)), motion_for(samples, C)
-        command(table, values[0], values[1] * scene.stiffness, scene.stiffness, commands)
-        motion.poses[0] = batch.desired[0, 0]
-        start_motion(table, values[0], values[1], motion)
-        work = work_for(C, batch.arrays.walls.shape[1])
-        advance(s, settings.physics, commands, 0, motion, work)
-        knots = motion.poses[:: settings.substeps]
-        return float((knots * weights).sum()), modes(s, settings.physics, commands, motion, work)
+        plans = Plans(values[:1].copy(), values[1:] * scene.stiffness, loaded, start)
+        item, memory = item_of(batch.arrays, plans, 0, numbers), run_for(batch.arrays, plans, numbers)
+        execute(item, table_of(item, numbers), memory)
+        knots = memory.motion.poses[:: numbers["substeps"]]
+        return float((knots * weights).sum()), modes(item.world, memory)
 
     _, base = run(plan)
     gradient, steady = np.zeros(plan.size), np.zeros(plan.size, dtype=bool)
@@ -214,14 +207,14 @@ def reference_gradient(
 
 
 @njit
-def modes(scene: View, physics: Physics, commands: np.ndarray, motion: Motion, work: Work) -> np.ndarray:
+def modes(world: World, run: Run) -> np.ndarray:
     """A number per substep that stands for the features in contact and their states."""
-    out = np.zeros(len(commands) - 1, np.int64)
+    motion, out = run.motion, np.zeros(len(run.commands) - 1, np.int64)
     for i in range(len(out)):
-        q, v, p = motion.poses[i], motion.velocities[i], motion.fingers[i]
-        n, _ = solve_step(scene, physics, q, v, p, commands[i + 1], work)
+        before = State(motion.poses[i], motion.velocities[i], motion.fingers[i])
+        n, _ = solve_step(world, before, run.commands[i + 1], run.work)
         for k in range(n):
-            c = work.contacts[k]
+            c = run.work.problem.contacts[k]
             if c.state > 0:
                 name = ((c.kind * 8 + c.finger + 1) * 64 + c.feature) * 8 + c.wall + 1
                 out[i] = out[i] * 1_000_003 + name * 4 + c.state

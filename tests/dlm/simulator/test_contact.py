@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from datasets.shapes import Shapes, sample_polygon
 from dlm.simulator import SceneBatch, SimulatorSettings
-from dlm.simulator.contact import CONTACT, FACET, WALL, activation, collect, nearest, view
+from dlm.simulator.contact import CONTACT, FACET, WALL, Moment, activation, collect, nearest
+from dlm.simulator.world import World, world_of
 from expert.geometry.polygon import signed_distance
 from expert.world.shape import Body
 from tests.support.scenes import T, scene
@@ -16,17 +17,15 @@ U_SHAPE = np.array([[0, 0], [6, 0], [6, 4], [4, 4], [4, 2], [2, 2], [2, 4], [0, 
 REST = np.zeros(3)
 
 
-def facets_of(vertices):
-    return view(
-        SceneBatch.of([scene(Body(vertices=vertices, mass=0.1, inertia=1e-4), np.zeros((T, 3)))]).arrays, 0
-    )
+def world(vertices) -> World:
+    body = Body(vertices=vertices, mass=0.1, inertia=1e-4)
+    return world_of(SceneBatch.of([scene(body, np.zeros((T, 3)))]).arrays, 0, SimulatorSettings().numbers)
 
 
 def contacts_at(vertices, finger, pose=REST):
-    s, out = facets_of(vertices), np.zeros(10, CONTACT)
-    fingers = np.array([finger], dtype=float)
-    n = collect(s, SimulatorSettings().physics, pose, np.zeros(3), fingers, np.zeros((1, 2)), out)
-    return out[:n]
+    out, fingers = np.zeros(10, CONTACT), np.array([finger], dtype=float)
+    now = Moment(pose, np.cos(pose[2]), np.sin(pose[2]), np.zeros(3), fingers, np.zeros((1, 2)))
+    return out[: collect(world(vertices), now, out)]
 
 
 @settings(deadline=None)
@@ -34,7 +33,7 @@ def contacts_at(vertices, finger, pose=REST):
 def test_signed_distance_agrees_with_the_geometry_package(seed, facets, point):
     shapes = Shapes(facets=(facets, facets), shortest_facet=0.2, deepest_dent=1.0, slightest_turn=0.05)
     vertices = sample_polygon(np.random.default_rng(seed), shapes)
-    _, _, distance = nearest(facets_of(vertices).facets, *point)
+    _, _, distance = nearest(world(vertices).facets, *point)
     assert distance == pytest.approx(float(signed_distance(vertices, np.array(point))), abs=1e-12)
 
 

@@ -5,7 +5,8 @@ import pytest
 import torch
 
 from dlm.metrics import object_trajectory_loss, within
-from dlm.simulator import Execution, SceneBatch, SimulatorSettings, rollout
+from dlm.simulator import Execution, SceneBatch, SimulatorSettings
+from dlm.simulator.gradient import rollout
 from dlm.simulator.mujoco import replay_in_mujoco
 from tests.benchmarks.simulator import descend
 from tests.support.expert_plans import planned_tasks, transverse_tasks

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from dlm.simulator import Execution, SceneBatch, SimulatorSettings, replay, rollout
+from dlm.simulator import Execution, SceneBatch, SimulatorSettings, replay
+from dlm.simulator.gradient import rollout
 from tests.support.scenes import MASS, T, batch_of, lift, push, random_case, transverse_push
 
 STIFFNESS = 1e5 * MASS

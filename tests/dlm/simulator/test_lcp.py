@@ -5,8 +5,16 @@ import itertools
 import numpy as np
 import pytest
 
-from dlm.simulator.contact import CONTACT
-from dlm.simulator.lcp import OPEN, ROW, SLIP_MINUS, SLIP_PLUS, STICK, solve_contacts, solve_linear
+from dlm.simulator.lcp import (
+    OPEN,
+    ROW,
+    SLIP_MINUS,
+    SLIP_PLUS,
+    STICK,
+    problem_for,
+    solve_contacts,
+    solve_linear,
+)
 
 
 def random_problem(rng, n, friction):
@@ -18,10 +26,10 @@ def random_problem(rng, n, friction):
 
 def solve(A, c, mu):
     n = len(mu)
-    contacts, rows = np.zeros(n, CONTACT), np.zeros(2 * n, ROW)
-    contacts["friction"], rows["c"] = mu, c
-    exact = solve_contacts(n, contacts, rows, A.copy(), np.zeros_like(A))
-    return rows["P"].copy(), contacts["state"].copy(), exact
+    problem = problem_for(n)
+    problem.contacts["friction"], problem.rows["c"], problem.A[:] = mu, c, A
+    exact = solve_contacts(n, problem)
+    return problem.rows["P"].copy(), problem.contacts["state"].copy(), exact
 
 
 def violation(A, c, mu, P):

@@ -26,9 +26,9 @@ def test_an_exported_file_holds_the_whole_plan(tmp_path):
     export_plan(path, case.scene, case.positions, case.forces)
     assert mujoco.MjModel.from_xml_path(str(path)).nq == 3 + 4
     replayed = replay_model(path.read_text())
-    np.testing.assert_array_equal(
-        replayed.poses, replay_in_mujoco(case.scene, case.positions, case.forces).poses
-    )
+    ours = replay(case.scene, case.positions, case.forces)
+    np.testing.assert_allclose(replayed.poses, ours.poses, atol=2e-4)
+    np.testing.assert_allclose(replayed.fingers[::20], ours.fingers[::20], atol=5e-4)
 
 
 def test_frictionless_scenes_let_the_lift_slip():

@@ -8,11 +8,12 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dlm.simulator import Scene, SceneBatch, SimulatorSettings, replay, rollout, rollout_with_status
+from dlm.simulator import Scene, SceneBatch, SimulatorSettings, replay
+from dlm.simulator.gradient import rollout, rollout_with_status
 from expert.errors import InvalidProblem
 from expert.geometry.pose import to_world
 from expert.world.shape import Body
-from tests.support.scenes import DT, T, batch_of, lift, push, random_case, scene
+from tests.support.scenes import T, batch_of, lift, push, random_case
 
 
 def test_a_batch_equals_its_single_runs_bit_for_bit():
@@ -58,17 +59,6 @@ def test_nan_in_one_item_leaves_the_others_alone(gradient):
     assert not got[1].any()
 
 
-def test_contact_flags_follow_the_forces_unless_given():
-    case = push()
-    batch, positions, forces = batch_of([case])
-    flags = np.zeros((1, T, 2), dtype=bool)
-    flags[0, :, 0] = True
-    assert torch.equal(rollout(batch, positions, forces), rollout(batch, positions, forces, contact=flags))
-    idle = rollout(batch, positions, forces, contact=np.zeros_like(flags))
-    parked = batch.desired[0, -1, 0] - SimulatorSettings().execution.parking  # follows at a distance
-    assert idle[0, -1, 0].item() == pytest.approx(parked, abs=3e-4)
-
-
 def test_a_start_offset_moves_the_object_and_not_the_fingers():
     case = lift()
     batch, positions, forces = batch_of([case])
@@ -78,13 +68,15 @@ def test_a_start_offset_moves_the_object_and_not_the_fingers():
     assert poses[0, -1, 1].item() == pytest.approx(batch.desired[0, -1, 1] + 5e-4, abs=1e-4)
 
 
-def test_batches_of_mixed_sizes_pad_without_effect():
-    cases = [push(), lift()] + [random_case(np.random.default_rng(k)) for k in range(3)]
-    batch, positions, forces = batch_of(cases)
-    part = batch[[3, 0]]
-    assert len(part) == 2
-    whole = rollout(batch, positions, forces)
-    assert torch.equal(rollout(part, positions[[3, 0]], forces[[3, 0]]), whole[[3, 0]])
+def test_contact_flags_follow_the_forces_unless_given():
+    case = push()
+    batch, positions, forces = batch_of([case])
+    flags = np.zeros((1, T, 2), dtype=bool)
+    flags[0, :, 0] = True
+    assert torch.equal(rollout(batch, positions, forces), rollout(batch, positions, forces, contact=flags))
+    idle = rollout(batch, positions, forces, contact=np.zeros_like(flags))
+    parked = batch.desired[0, -1, 0] - SimulatorSettings().execution.parking  # follows at a distance
+    assert idle[0, -1, 0].item() == pytest.approx(parked, abs=3e-4)
 
 
 def test_mistaken_shapes_are_refused_by_name():
@@ -154,21 +146,16 @@ def test_overflow_is_reported_and_held():
     case = push()
     wild = replace(case.scene, stiffness=1e300)
     batch = SceneBatch.of([wild])
-    far = torch.tensor(case.positions[None] * 1e90)
+    far = torch.tensor(case.positions[None] * [1e90, 1])
     poses, ok = rollout_with_status(batch, far, torch.tensor(case.forces[None]))
     assert torch.isfinite(poses).all()
-    assert ok.dtype == torch.bool
+    assert not ok.any()
 
 
 def test_many_fingers_and_no_walls():
-    rng = np.random.default_rng(1)
-    case = random_case(rng, fingers=5, plane="transverse")
+    case = random_case(np.random.default_rng(1), fingers=5, plane="transverse")
     r = replay(case.scene, case.positions, case.forces)
     assert r.ok
     assert r.fingers.shape == (81, 5, 2)
-    assert case.scene.trajectory.dt == DT
-
-
-def test_one_scene_of_a_block_matches_its_task():
-    s = scene(push().scene.body, push().scene.trajectory.poses)
-    assert s.stiffness == pytest.approx(1e4)
+    assert len(np.unique(r.contacts.finger)) >= 3
+    assert (r.contacts.wall == -1).all()

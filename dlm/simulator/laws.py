@@ -1,0 +1,96 @@
+"""What a recorded motion did at every step: contacts and their forces, work of the fingers, and the laws of mechanics."""
+
+import numpy as np
+from numba import njit
+
+from dlm.simulator.lcp import relative_velocity
+from dlm.simulator.rollout import Run
+from dlm.simulator.step import Work, solve_step
+from dlm.simulator.world import State, World
+
+TRACE = np.dtype(
+    [(name, "i8") for name in ("step", "finger", "wall")]
+    + [(name, "f8") for name in ("x", "y", "fx", "fy", "gap", "slip")]
+)
+"""A contact that carried force: substep, finger or -1, wall or -1, point, force on the object, gap before, slip after."""
+LAWS = np.dtype([("momentum", "f8"), ("cone", "f8")])
+"""Largest violation of Newton's law, and of friction cones and complementarity [N]."""
+
+
+@njit(cache=True, error_model="numpy")
+def trace(world: World, run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Contacts (n,) of TRACE, residuals (1,) of LAWS, and work of the fingers (S,), of a motion that was run."""
+    motion, commands, work = run
+    S = len(commands) - 1
+    out, laws = np.zeros(S * len(work.problem.contacts), TRACE), np.zeros(1, LAWS)
+    finger_work = np.zeros(S)
+    count = 0
+    for i in range(S):
+        before = State(motion.poses[i], motion.velocities[i], motion.fingers[i])
+        n, _ = solve_step(world, before, commands[i + 1], work)
+        law = laws[0]
+        law.momentum = max(law.momentum, _momentum(n, world, before, commands[i + 1], work))
+        for k in range(n):
+            law.cone = max(law.cone, _cone(n, k, world, work))
+            if work.problem.rows[2 * k].P != 0 or work.problem.rows[2 * k + 1].P != 0:
+                out[count].step = i
+                finger_work[i] += _note_contact(k, world, before, work, out[count])
+                count += 1
+    return out[:count], laws, finger_work
+
+
+@njit(cache=True, error_model="numpy")
+def _note_contact(k: int, world: World, before: State, work: Work, out: np.record) -> float:
+    """Fill the record of contact k; its finger's work on the object during the step."""
+    contact, f = work.problem.contacts[k], work.problem.contacts[k].finger
+    normal, tangent = work.problem.rows[2 * k], work.problem.rows[2 * k + 1]
+    out.finger, out.wall, out.gap, out.x, out.y = f, contact.wall, contact.gap, contact.x, contact.y
+    out.fx = (normal.P * normal.x + tangent.P * tangent.x) / world.h
+    out.fy = (normal.P * normal.y + tangent.P * tangent.y) / world.h
+    after = work.velocity
+    out.slip = tangent.x * after[0] + tangent.y * after[1] + tangent.turn * after[2]
+    if f < 0:
+        return 0.0
+    out.slip -= tangent.x * work.finger_velocity[f, 0] + tangent.y * work.finger_velocity[f, 1]
+    turn = (normal.P * normal.turn + tangent.P * tangent.turn) / world.h
+    mid = 0.5 * (before.velocity + after)
+    return world.h * (out.fx * mid[0] + out.fy * mid[1] + turn * mid[2])
+
+
+@njit(cache=True, error_model="numpy")
+def _momentum(n: int, world: World, before: State, command: np.ndarray, work: Work) -> float:
+    """Violation of Newton's law for object (support plane aside) and fingers, moments over the radius of gyration [N]."""
+    h, v, after, p = world.h, before.velocity, work.velocity, before.fingers
+    net = np.array([after[0] - v[0], after[1] - v[1] + h * world.gravity, after[2] - v[2]])
+    net *= np.array([world.mass, world.mass, world.inertia])
+    spring = np.zeros_like(p)
+    for c in range(len(p)):
+        for d in range(2):
+            drop = command[c, d] - p[c, d] - h * work.finger_velocity[c, d]
+            spring[c, d] = world.stiffness * drop - world.damping * work.finger_velocity[c, d]
+    for k in range(n):
+        contact, normal, tangent = (
+            work.problem.contacts[k],
+            work.problem.rows[2 * k],
+            work.problem.rows[2 * k + 1],
+        )
+        fx, fy = normal.P * normal.x + tangent.P * tangent.x, normal.P * normal.y + tangent.P * tangent.y
+        net[0] -= fx
+        net[1] -= fy
+        net[2] -= (contact.x - before.pose[0]) * fy - (contact.y - before.pose[1]) * fx
+        if contact.finger >= 0:
+            spring[contact.finger, 0] -= fx / h
+            spring[contact.finger, 1] -= fy / h
+    net[2] /= np.sqrt(world.inertia / world.mass)
+    largest = np.abs(spring).max() if len(p) > 0 else 0.0
+    return largest if world.support > 0 else max(largest, np.abs(net).max() / h)
+
+
+@njit(cache=True, error_model="numpy")
+def _cone(n: int, k: int, world: World, work: Work) -> float:
+    """Violation of signs, friction cone and complementarity by contact k, as a force [N]."""
+    normal, tangent = work.problem.rows[2 * k].P, work.problem.rows[2 * k + 1].P
+    cone = max(-normal, abs(tangent) - work.problem.contacts[k].friction * normal)
+    y = relative_velocity(n, work.problem, 2 * k)
+    broken = abs(y) if normal > 0 else max(-y, 0.0)
+    return max(cone, broken * world.mass) / world.h
