@@ -6,7 +6,8 @@ Pixel coordinates here are (X, Y) with Y upwards: pixel [j, i] of an image is th
 import numba
 import numpy as np
 
-from expert.geometry.pose import Array
+from expert.geometry.polygon import crossing_edges
+from expert.geometry.pose import Array, cross
 
 
 @numba.njit(cache=True)
@@ -78,25 +79,9 @@ SHARPEST = 0.3
 """Corners are wider than this [rad]."""
 
 
-@numba.njit(cache=True)
 def is_simple(vertices: Array) -> bool:
-    """Whether no two edges of a polygon (V, 2) cross, and none folds back on the one before."""
-    count = len(vertices)
-    for i in range(count):
-        a, b, c = vertices[i], vertices[(i + 1) % count], vertices[(i + 2) % count]
-        back, along = b - a, c - b
-        fold = np.arctan2(
-            abs(back[0] * along[1] - back[1] * along[0]), -(back[0] * along[0] + back[1] * along[1])
-        )
-        if fold < SHARPEST:
-            return False
-        for j in range(i + 2, count if i > 0 else count - 1):
-            c, d = vertices[j], vertices[(j + 1) % count]
-            if _side(a, b, c) * _side(a, b, d) <= 0 and _side(c, d, a) * _side(c, d, b) <= 0:
-                return False
-    return True
-
-
-@numba.njit(cache=True)
-def _side(a: Array, b: Array, c: Array) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    """Whether no two edges of a polygon (V, 2) meet, and none folds back on the one before."""
+    edges = np.roll(vertices, -1, axis=0) - vertices
+    back, along = -edges, np.roll(edges, -1, axis=0)
+    wide = np.arctan2(np.abs(cross(back, along)), (back * along).sum(axis=1)) >= SHARPEST
+    return bool(wide.all()) and crossing_edges(vertices) is None

@@ -1,14 +1,15 @@
 """Simple polygons, vertices (V, 2) in counter-clockwise order; facet k runs from vertex k to vertex k + 1."""
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
-import shapely
 
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, cross, perpendicular
 
 NDArrayBool = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 
 @dataclass(frozen=True)
@@ -84,18 +85,60 @@ def _shorten(value: object) -> str:
 
 
 def crossing_edges(v: Array) -> tuple[int, int] | None:
-    """First pair of edges that meet anywhere but in a shared vertex; None for a simple polygon."""
-    if shapely.LinearRing(v).is_simple:
-        return None
+    """First pair of edges that meet anywhere but in a shared vertex; None for a simple polygon.  Exact."""
+    i, j = np.triu_indices(len(v), 1)
+    doubtful = np.flatnonzero(~_clearly_apart(v, i, j))
+    pairs = ((int(i[k]), int(j[k])) for k in doubtful)
+    return next((pair for pair in pairs if _meet(v, *pair)), None)
+
+
+def _clearly_apart(v: Array, i: IntArray, j: IntArray) -> NDArrayBool:
+    """Which pairs of edges i < j have nothing but a shared vertex in common, whatever the rounding."""
     n = len(v)
-    edges = shapely.linestrings(np.stack([v, np.roll(v, -1, axis=0)], axis=1))
-    for i in range(n):
-        for j in range(i + 1, n):
-            meeting = edges[i].intersection(edges[j])
-            neighbours = j == i + 1 or (i == 0 and j == n - 1)
-            if not meeting.is_empty and not (neighbours and meeting.geom_type == "Point"):
-                return i, j
-    return 0, 1  # simple edge by edge, yet refused as a ring: degenerate beyond doubles
+    a, b, c, d = v[i], v[(i + 1) % n], v[j], v[(j + 1) % n]
+    c_side, d_side, a_side, b_side = (
+        _side_of(a, b, c),
+        _side_of(a, b, d),
+        _side_of(c, d, a),
+        _side_of(c, d, b),
+    )
+    boxes_apart = (np.maximum(a, b) < np.minimum(c, d)).any(1) | (np.maximum(c, d) < np.minimum(a, b)).any(1)
+    apart = boxes_apart | (c_side * d_side > 0) | (a_side * b_side > 0)
+    turns_on = (d_side != 0) | (((a - b) * (d - b)).sum(1) < 0)
+    turns_back = (b_side != 0) | (((b - a) * (c - a)).sum(1) < 0)
+    neighbours, ends = j == i + 1, (i == 0) & (j == n - 1)
+    return np.where(neighbours, turns_on, np.where(ends, turns_back, apart))
+
+
+def _side_of(a: Array, b: Array, c: Array) -> IntArray:
+    """1: c is left of the line from a to b, -1: right of it, 0: too close to tell in doubles (Shewchuk's bound)."""
+    left = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1])
+    right = (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    doubt = 4e-16 * (np.abs(left) + np.abs(right)) + 1e-300  # products may underflow
+    return np.sign(np.where(np.abs(left - right) > doubt, left - right, 0)).astype(np.int64)
+
+
+def _meet(v: Array, i: int, j: int) -> bool:
+    """Whether edges i < j have more than a shared vertex in common, in rational numbers."""
+    n = len(v)
+    a, b, c, d = ([Fraction(float(x)) for x in v[k % n]] for k in (i, i + 1, j, j + 1))
+    if j == i + 1:
+        return _folds_back(a, b, d)
+    if i == 0 and j == n - 1:
+        return _folds_back(c, a, b)
+    boxes = all(
+        max(min(p, q), min(r, s)) <= min(max(p, q), max(r, s)) for p, q, r, s in zip(a, b, c, d, strict=True)
+    )
+    return boxes and _side(a, b, c) * _side(a, b, d) <= 0 and _side(c, d, a) * _side(c, d, b) <= 0
+
+
+def _folds_back(a: list[Fraction], b: list[Fraction], c: list[Fraction]) -> bool:
+    """Whether edge b-c runs along edge a-b."""
+    return _side(a, b, c) == 0 and sum((x - y) * (z - y) for x, y, z in zip(a, b, c, strict=True)) > 0
+
+
+def _side(a: list[Fraction], b: list[Fraction], c: list[Fraction]) -> Fraction:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def facets(vertices: Array) -> tuple[Array, Array]:

@@ -147,3 +147,35 @@ def test_crossing_edges_are_named() -> None:
     assert crossing_edges(np.array([[0.0, 0], [1, 1], [1, 0], [0, 1]])) == (0, 2)
     assert crossing_edges(np.array([[0.0, 0], [2, 0], [2, 2], [1, 0], [0, 2]])) is not None  # touches edge 0
     assert crossing_edges(AWKWARD["spiral"]) is None
+
+
+def test_collinear_edges_apart_do_not_cross() -> None:
+    """Two teeth of a comb stand on one line."""
+    comb = np.array([[0, 0], [5, 0], [5, 2], [4, 2], [4, 1], [2, 1], [2, 2], [0, 2]], dtype=float)
+    assert crossing_edges(comb) is None
+    turned = comb @ np.array([[0.8, 0.6], [-0.6, 0.8]])  # only up to rounding on one line
+    assert crossing_edges(turned) is None
+
+
+def test_edges_that_only_touch_are_named() -> None:
+    pinched = np.array([[0, 0], [4, 0], [4, 4], [2, 0], [0, 4]], dtype=float)  # a corner on an edge
+    assert crossing_edges(pinched) == (0, 2)
+    folded = np.array([[0, 0], [4, 0], [2, 0], [2, 3]], dtype=float)
+    assert crossing_edges(folded) == (0, 1)
+    bow = np.array([[0, 0], [2, 2], [2, 0], [0, 2]], dtype=float)
+    assert crossing_edges(bow) == (0, 2)
+
+
+@given(st.lists(st.tuples(st.integers(0, 6), st.integers(0, 6)), min_size=4, max_size=8, unique=True))
+def test_crossing_edges_agree_with_shapely_on_grids(points: list[tuple[int, int]]) -> None:
+    """Where lines through three points and shared coordinates are the rule."""
+    v = np.array(points, dtype=float)
+    edges = shapely.linestrings(np.stack([v, np.roll(v, -1, axis=0)], axis=1))
+    n, meeting = len(v), []
+    for i in range(n):
+        for j in range(i + 1, n):
+            common = edges[i].intersection(edges[j])
+            neighbours = j == i + 1 or (i == 0 and j == n - 1)
+            if not common.is_empty and not (neighbours and common.geom_type == "Point"):
+                meeting.append((i, j))
+    assert crossing_edges(v) == (meeting[0] if meeting else None)
