@@ -15,9 +15,12 @@ import numpy as np
 from expert.budget import Budget
 from expert.errors import InvalidProblem
 from expert.problems.cage import Arrangement, CageProblem, CageSolution
-from expert.verify.cage.claims import unmet_claim
+from expert.verify.cage.claims import CLAIMED, unmet_claim
 from expert.verify.cage.report import CageReport
 from expert.verify.cage.search import UNIT, CageSearch
+
+CELL_BUDGET = 3000
+"""Cells after which the answer is UNKNOWN."""
 
 
 def verify_cage(
@@ -26,7 +29,7 @@ def verify_cage(
     slack: float = 0.0,
     range_resolution: float = np.radians(0.5),
     finest: float = np.radians(1 / 32),
-    cell_budget: int = 3000,
+    cell_budget: int = CELL_BUDGET,
     within: tuple[float, float] | None = None,
 ) -> CageReport:
     """Decide whether the object can leave its obstacles.
@@ -50,6 +53,7 @@ def verify_cage(
         resolution=0.5 * UNIT * min(cell.width for cell in search.ahead if cell.width),
         seconds=budget.spent,
         rotation_range=search.rotation_range() if verdict == "caged" else None,
+        turns_beyond=verdict == "caged" and within is not None and search.shown_beyond(within),
         path=path,
     )
 
@@ -69,6 +73,26 @@ def verify(task: Arrangement | CageProblem, answer: CageSolution | None = None) 
         raise InvalidProblem(
             "status", expected="caged", got=answer.status, remedy="there is no claim to check"
         )
-    if claim := unmet_claim(task, answer):
-        return CageReport(verdict="refuted", claim=answer.status, reason=claim)
-    return replace(verify_cage(task.arrangement(answer.fingers)), claim=answer.status)
+    if fault := unmet_claim(task, answer):
+        return CageReport(verdict="refuted", claim=answer.status, claimed=CLAIMED, reason=fault)
+    return _with_range(task.arrangement(answer.fingers), answer)
+
+
+def _with_range(arrangement: Arrangement, answer: CageSolution) -> CageReport:
+    """Verdict on a cage and on the orientations that the answer says it keeps; none stated: it may turn freely."""
+    stated = answer.rotation_range
+    theta = float(arrangement.pose[2])
+    within = (stated[0] - theta, stated[1] - theta) if stated is not None else None
+    report = replace(verify_cage(arrangement, within=within), claim=answer.status, claimed=CLAIMED)
+    if stated is None or report.rotation_range is None or _contains(stated, report.rotation_range):
+        return report
+    limits = "[{:.6g}, {:.6g}] deg".format(*np.degrees(stated))
+    if report.turns_beyond:
+        return replace(
+            report, verdict="refuted", reason=f"it turns beyond {limits}, which it is said to keep"
+        )
+    return replace(report, verdict="unknown", reason=f"that it keeps {limits} is not shown")
+
+
+def _contains(stated: tuple[float, float], shown: tuple[float, float]) -> bool:
+    return stated[0] <= shown[0] + 1e-9 and shown[1] <= stated[1] + 1e-9

@@ -7,52 +7,33 @@ import itertools
 
 import numpy as np
 
-from expert.geometry.pose import Array, cross
+from expert.geometry.pose import Array
 from expert.problems.cage import CageProblem, CageSolution
+from expert.verify.grippers import TOLERANCE, direction_fault, opening_fault
 
-TOLERANCE = 1e-5
-"""Of lengths, relative to the object's size; of areas, to its square."""
+CLAIMED = ("topology", "seconds", "attempts", "refuted", "unconfirmed", "reason")
+"""Fields of an answer that say how it was found: nothing here depends on them."""
 
 
 def unmet_claim(task: CageProblem, answer: CageSolution) -> str:
     """The first claim that the answer's fingers do not keep; empty if they keep all."""
+    size = task.shape.size
     return (
-        _openings(task, answer.fingers)
-        or (_common_direction(task, answer.fingers) if task.parallel else "")
+        opening_fault(task.grippers, answer.fingers, size)
+        or (direction_fault(task.grippers, answer.fingers, size, task.direction) if task.parallel else "")
         or _cost(task, answer)
     )
-
-
-def _openings(task: CageProblem, fingers: Array) -> str:
-    for k, gripper in enumerate(task.grippers):
-        i, j = gripper.fingers
-        length = float(np.linalg.norm(fingers[j] - fingers[i]))
-        least, most = gripper.opening
-        if not least - TOLERANCE * task.shape.size <= length <= most + TOLERANCE * task.shape.size:
-            return f"gripper {k} opens by {length:.4g} m, outside [{least:g}, {most:g}]"
-    return ""
-
-
-def _common_direction(task: CageProblem, fingers: Array) -> str:
-    """Of all grippers, from their first to their second finger; the stated one where there is one."""
-    area = TOLERANCE * task.shape.size**2
-    steps = [
-        (f"gripper {k}", fingers[g.fingers[1]] - fingers[g.fingers[0]]) for k, g in enumerate(task.grippers)
-    ]
-    if task.direction is not None:
-        stated = task.shape.size * np.array([np.cos(task.direction), np.sin(task.direction)])
-        steps.append(("the stated direction", stated))
-    for (one, a), (other, b) in itertools.combinations(steps, 2):
-        if abs(cross(a, b)) > area or a @ b < -area:
-            return f"{one} is not parallel to {other}"
-    return ""
 
 
 def _cost(task: CageProblem, answer: CageSolution) -> str:
     """Recomputed from the fingers and compared with what the answer states."""
     p, size = answer.fingers, task.shape.size
     if task.cost == "none":
-        return ""
+        return (
+            f"a cost of {answer.objective:.6g}, where none was asked for"
+            if np.isfinite(answer.objective)
+            else ""
+        )
     if task.cost == "min_separation":
         cost, scale = sum(float((a - b) @ (a - b)) for a, b in itertools.combinations(p, 2)), size**2
     else:

@@ -15,6 +15,10 @@ import shapely
 from expert.geometry.pose import Array, to_body, to_world
 from expert.problems.cage import START_TOLERANCE, Arrangement
 
+DEPTHS = (0.0, 1e-10, START_TOLERANCE)
+"""The object may be entered by this fraction of its diameter: by nothing, if the path allows it, at most as at the start."""
+BLUNTED = 1e-6
+"""Corners of the object drawn in by a depth must stay within this fraction of its diameter: what is thinner would be missed."""
 _TOUCH = 1e-13
 """Crossing tests call anything closer than this, relative to the lengths compared, a crossing."""
 
@@ -22,23 +26,49 @@ _TOUCH = 1e-13
 def escape_fault(arrangement: Arrangement, path: Array) -> str | None:
     """Why the path is no escape, or None if it is one.  path: body poses (K, 3), from the start pose on.
 
-    The object may be entered by START_TOLERANCE of its diameter, as at the start pose.
+    The object may be entered by START_TOLERANCE of its diameter, as at the start pose, but only where that leaves its
+    shape as it is: a needle thinner than this is no hole.
     """
     if len(path) < 1 or not np.isfinite(path).all():
         return "no poses"
     size = arrangement.shape.size
     if np.abs(path[0] - arrangement.pose).max() > 1e-9 * max(size, 1.0):
         return "it does not begin at the start pose"
-    core = shapely.Polygon(arrangement.shape.vertices).buffer(-START_TOLERANCE * size, join_style="mitre")
-    if _overlap(arrangement, core, path[0]):
-        return "it begins in collision"
     for k, (a, b) in enumerate(itertools.pairwise(path)):
         if abs(b[2] - a[2]) > 3.0:
             return f"move {k} turns by more than 3 rad"
-        if move_collides(a, b, core_edges(core), arrangement.fingers, arrangement.wall_ends):
-            return f"move {k} collides"
     if not is_free_forever(arrangement, path[-1]):
         return "its end is still among the obstacles"
+    fault: str | None = None
+    for depth in DEPTHS:
+        core = drawn_in(arrangement.shape.vertices, depth * size, BLUNTED * size)
+        if core is None:
+            return fault or "its parts are thinner than what can be checked"
+        fault = _collision(arrangement, core, path)
+        if fault is None:
+            return None
+    return fault
+
+
+def drawn_in(vertices: Array, depth: float, most: float) -> shapely.Polygon | None:
+    """A polygon drawn in by `depth`; None where this moves some corner by more than `most`, or cuts it into parts."""
+    polygon = shapely.Polygon(vertices)
+    if depth == 0:
+        return polygon
+    core = polygon.buffer(-depth, join_style="mitre")
+    if core.geom_type != "Polygon" or core.is_empty:
+        return None
+    return core if shapely.distance(shapely.points(vertices), core).max() <= most else None
+
+
+def _collision(arrangement: Arrangement, core: shapely.Polygon, path: Array) -> str | None:
+    """Where a finger or wall meets the drawn-in object; None: nowhere."""
+    if _overlap(arrangement, core, path[0]):
+        return "it begins in collision"
+    edges = core_edges(core)
+    for k, (a, b) in enumerate(itertools.pairwise(path)):
+        if move_collides(a, b, edges, arrangement.fingers, arrangement.wall_ends):
+            return f"move {k} collides"
     return None
 
 

@@ -15,6 +15,7 @@ class CageReport(Report):
 
     rotation_range: orientations [rad] that the object can reach at most (caged); (-inf, inf) where it may turn for good.
     path: body poses (K, 3) of an escape; neighbours differ by a translation or by a rotation about a fixed point.
+    turns_beyond: whether it is shown to reach orientations that it was expected not to.
     resolution: half-width [rad] of the smallest cell.  cells: how many were computed.
     An answer is refuted before its cage is looked at where its grippers cannot do it, or its cost is another.
     """
@@ -25,6 +26,7 @@ class CageReport(Report):
     cells: int = 0
     resolution: float = np.pi
     rotation_range: tuple[float, float] | None = None
+    turns_beyond: bool = False
     path: Array = field(default_factory=lambda: np.empty((0, 3)))
 
     def evidence(self) -> dict[str, Any]:
@@ -41,11 +43,9 @@ class CageReport(Report):
     def lines(self) -> list[str]:
         """One line."""
         cells = f"{self.cells} cells, half-width down to {np.degrees(self.resolution):.3g} deg"
-        return [f"{self.verdict}: {self._summary()}" + ("" if self.verdict == "refuted" else f" ({cells})")]
+        return [f"{self.verdict}: {self.reason or self._summary()}" + (f" ({cells})" if self.cells else "")]
 
     def _summary(self) -> str:
-        if self.verdict == "refuted":
-            return self.reason
         if self.verdict == "escapes":
             return f"a collision-free path of {len(self.path)} poses, checked exactly"
         if self.verdict == "unknown":

@@ -210,6 +210,19 @@ class CageSearch:
         self.reached = seen
         return {cell for cell, _ in route or [] if cell.width > self.finest}
 
+    def shown_beyond(self, within: tuple[float, float]) -> bool:
+        """Whether the object is shown to reach orientations outside `within` [rad], relative to the start."""
+        low, high = within
+
+        def is_beyond(cell: Cell) -> bool:
+            return bool(cell.width) and cell.bounds[0] > high and cell.bounds[1] < 2 * np.pi + low
+
+        if not any(map(is_beyond, self.reached)):
+            return False
+        for cell in self.reached:
+            self.complex.outer(cell)
+        return any(is_beyond(cell) for cell, _ in self.outer_flood(self.outer_starts()))
+
     def _last(self, onward: dict[Cell, Cell]) -> Cell:
         cell = START
         while onward[cell] in self.reached:

@@ -25,6 +25,7 @@ from expert.problems.cage import START_TOLERANCE
 from expert.problems.grasp import GraspProblem, GraspSolution
 from expert.verify.cage.check import verify_cage
 from expert.verify.cage.search import UNIT
+from expert.verify.grasp.claims import CLAIMED, cost_fault, gripper_fault
 from expert.verify.grasp.dead_ends import DeadEndEvent, dead_end_events
 from expert.verify.grasp.end_grasp import (
     NOT_ISOLATED,
@@ -45,6 +46,7 @@ from expert.world.values import readonly
 
 TIGHT, WIDE = np.radians([2, 10])
 """What can be reached may leave a knot's half-range by the one, or else the first one's by the other, before it leaks."""
+NO_STARTS = np.empty((0, 2))
 ROUNDS = 3
 """What can be reached is computed with cells so often a quarter as wide, while that may yet exclude a dead end."""
 
@@ -60,7 +62,14 @@ def verify(task: GraspProblem, answer: GraspSolution | None = None) -> GraspRepo
         raise InvalidProblem(
             "status", expected="finger paths", got=answer.status, remedy="there is no claim to check"
         )
-    return replace(verify_grasp(task, answer.path, answer.facets), claim=answer.status)
+    report = replace(
+        verify_grasp(task, answer.path, answer.facets, starts=answer.starts),
+        claim=answer.status,
+        claimed=CLAIMED,
+    )
+    if fault := cost_fault(task, answer):
+        report = replace(report, verdict="refuted", reason="; ".join(filter(None, [report.reason, fault])))
+    return report
 
 
 def verify_grasp(
@@ -68,25 +77,29 @@ def verify_grasp(
     path: Array,
     facets: Sequence[int] = (),
     *,
+    starts: Array = NO_STARTS,
     full: bool = True,
     time_limit: float = 20.0,
 ) -> GraspReport:
     """Decide whether fingers along straight lines between knots (K, N, 2) [m] bring all of Q0 to the goal.
 
-    facets: the one that each finger claims to touch in the end; empty: no claim.  full: report on all parts although one
+    facets: the one that each finger claims to touch in the end; starts (M, 2) [m]: polygon of translations from the goal, at
+    its orientation, that are claimed to be in Q0; empty: no claim.  full: report on all parts although one
     has failed.  time_limit [s]: processor time for what can be reached.
     Raises InvalidProblem for a path that does not fit the problem.
     """
     knots = readonly(path, (len(problem.half_ranges), problem.count, 2), "fingers.path")
-    check = _Check(problem, FingerPath(problem.shape, problem.pose, knots), tuple(facets))
+    check = _Check(problem, FingerPath(problem.shape, problem.pose, knots), tuple(facets), starts)
     return check.run(full, time_limit)
 
 
 class _Check:
     """The parts of one verification, the cheap ones first, and what they have found so far."""
 
-    def __init__(self, problem: GraspProblem, path: FingerPath, facets: tuple[int, ...]) -> None:
-        self.problem, self.path, self.facets = problem, path, facets
+    def __init__(
+        self, problem: GraspProblem, path: FingerPath, facets: tuple[int, ...], starts: Array
+    ) -> None:
+        self.problem, self.path, self.facets, self.starts = problem, path, facets, starts
         self.refuted: list[str] = []
         self.doubts: list[str] = []
         self.spent: dict[str, float] = {}
@@ -122,7 +135,7 @@ class _Check:
     def check_path(self) -> None:
         """Grippers can do it, and no finger enters the object that rests at the goal."""
         for k, fingers in enumerate(self.path.knots_w):
-            if fault := _gripper_fault(self.problem, fingers):
+            if fault := gripper_fault(self.problem, fingers):
                 self.refuted.append(f"knot {k}: {fault}")
         depth = self.path.deepest(np.zeros((1, 3)), 0.0, self.path.last)[0] * self.path.frame.radius
         if depth > START_TOLERANCE * self.problem.shape.size:
@@ -162,8 +175,15 @@ class _Check:
             self.doubts.append(f"orientations beyond the half-range may be reached at knots {wide.tolist()}")
 
     def check_start(self) -> None:
-        """Q0."""
+        """Q0, and that the starts claimed are in it."""
         self.start = StartSet(self.path)
+        if len(self.starts) < 3:
+            return
+        free, known = self.start.holds(self.starts)
+        if not free:
+            self.refuted.append("starts are claimed at which a finger is inside the object")
+        elif not known:
+            self.doubts.append("starts are claimed that are not shown to be in Q0")
 
     def check_dead_ends(self, time_limit: float) -> None:
         """What can be reached from Q0 stays bounded, meets no dead end, and is the goal alone in the end."""
@@ -254,15 +274,3 @@ class _Check:
         sure = np.flatnonzero(untouched & known & event.strict)
         pose = poses[sure[0]] if len(sure) else poses[len(poses) // 2]
         return DeadEnd(s=event.s, pose=pose, contacts=event.contacts, witness=pose if len(sure) else None)
-
-
-def _gripper_fault(problem: GraspProblem, fingers: Array) -> str:
-    """Which gripper cannot hold its fingers (N, 2) there; empty if all can."""
-    tolerance = 1e-6 * problem.shape.size
-    for k, gripper in enumerate(problem.grippers):
-        i, j = gripper.fingers
-        opening = float(np.linalg.norm(fingers[j] - fingers[i]))
-        least, most = gripper.opening
-        if not least - tolerance <= opening <= most + tolerance:
-            return f"gripper {k} opens by {opening:.4g} m, outside [{least:g}, {most:g}]"
-    return ""

@@ -14,6 +14,8 @@ from expert.world.values import require
 
 WIDTH = 8
 """Of a cell, in units of the cage verifier: half a degree."""
+SEAM = 1e-6
+"""Relative length by which a polygon of starts may touch what is not free."""
 
 
 class StartSet:
@@ -96,6 +98,19 @@ class StartSet:
             found[rows, :2] = _points_in(polygon, rng, len(rows))
             found[rows, 2] = rng.uniform(*signed_bounds(cell), len(rows))
         return self.path.frame.world_pose(found)
+
+    def holds(self, translations: Array) -> tuple[bool, bool]:
+        """Whether a polygon (M, 2) [m, world] of translations from the goal, at its orientation, is free, and proven to be held.
+
+        Up to SEAM: on its boundary fingers touch.
+        """
+        relative = shapely.Polygon(self.path.frame.relative(translations + self.path.frame.reference_w))
+        if not relative.is_valid:
+            return False, False
+        slice_, inside = self._cells.outer(START).polygons, relative.buffer(-SEAM)
+        blocked = shapely.difference(shapely.intersection(inside, self._cells.box), shapely.union_all(slice_))
+        elsewhere = shapely.difference(inside, shapely.union_all(slice_[self._prisms.get(START, [])]))
+        return bool(blocked.is_empty), bool(elsewhere.is_empty)
 
     def contains(self, poses: Array) -> np.ndarray:
         """Which world poses (M, 3) are proven members."""

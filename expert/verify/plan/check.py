@@ -5,10 +5,11 @@ cones and costs are written out again.  Lengths are measured over the object's s
 """
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from expert.budget import Budget
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import signed_distance
 from expert.geometry.pose import Array, cross, perpendicular, to_body, to_world
@@ -36,13 +37,23 @@ def verify(task: ContactTask, answer: Plan | None) -> PlanReport:
         raise InvalidProblem(
             "file", expected="a solution file", got="a problem file", remedy="solve it first"
         )
+    budget = Budget(np.inf)
     if answer.found:
-        return check_plan(task, answer)
-    if answer.status == "infeasible":
-        return check_infeasible(task)
-    return PlanReport(
-        verdict="unknown", claim=answer.status, reason="the solver found no plan; nothing to check"
-    )
+        report = check_plan(task, answer)
+    elif answer.status == "infeasible":
+        report = check_infeasible(task)
+    else:
+        reason = "the solver found no plan; nothing to check"
+        report = PlanReport(verdict="unknown", claim=answer.status, reason=reason)
+    return replace(report, claimed=_claimed(answer), seconds=budget.spent)
+
+
+def _claimed(answer: Plan) -> tuple[str, ...]:
+    """What an answer states that no check depends on: how it was found, and that nothing better exists."""
+    effort = ("seconds", "nodes", "reason")
+    if not answer.found:
+        return ("objective", "bound", "gap", "residual", *effort)
+    return (*(("status",) if answer.status == "optimal" else ()), "bound", "gap", *effort)
 
 
 def check_infeasible(task: ContactTask) -> PlanReport:
@@ -93,7 +104,11 @@ def _dynamics(task: ContactTask, plan: Plan, limits: Tolerances) -> tuple[Check,
         force[c.step] -= c.force
         torque[c.step] -= cross(c.point - q[c.step, :2], c.force)
     residual = np.column_stack([np.abs(force) / task.weight, np.abs(torque) / (task.weight * task.body.size)])
-    return (Check.largest("newton_euler", residual, limits.wrench, "m g, m g L", ("step", "component")),)
+    misstated = np.nan_to_num(abs(plan.residual - residual.max()))  # nan: nothing is stated
+    return (
+        Check.largest("newton_euler", residual, limits.wrench, "m g, m g L", ("step", "component")),
+        Check.largest("residual", misstated, limits.wrench, "m g, m g L", ()),
+    )
 
 
 def _finger_forces(task: ContactTask, plan: Plan, limits: Tolerances) -> tuple[Check, ...]:
@@ -212,7 +227,10 @@ def _displacement(task: ContactTask, step: int, point: Array) -> Array:
 
 
 def _wall_distance(task: ContactTask, contact: ContactForce) -> float:
-    """How far [m] the force is from the stretch of wall where the object rests now and at the next pose."""
+    """How far [m] the force is from the stretch of wall where the object rests now and at the next pose, and from its vertex.
+
+    The vertex that it names is one that rests there, drawn in by no more than the inset.
+    """
     wall, touching = task.environment.walls[contact.wall], _touching(task, contact)
     if not len(touching):
         return np.inf
@@ -221,7 +239,9 @@ def _wall_distance(task: ContactTask, contact: ContactForce) -> float:
     inset = task.robustness.support_inset * np.ptp(along)
     s = float(contact.point @ tangent)
     beyond = max(along.min() + inset - s, s - along.max() + inset)
-    return max(float(beyond), abs(float(wall.gap(contact.point))))
+    vertex = to_world(task.trajectory.poses[contact.step], task.body.vertices)[contact.vertex]
+    astray = float(np.linalg.norm(contact.point - vertex)) - inset
+    return max(float(beyond), abs(float(wall.gap(contact.point))), astray)
 
 
 def _touching(task: ContactTask, contact: ContactForce) -> Array:

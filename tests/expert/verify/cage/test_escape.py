@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from expert.geometry.pose import Array, rotation
 from expert.problems.cage import Arrangement
-from expert.verify.cage.escape import arc_meets_segment, escape_fault, segments_meet
+from expert.verify.cage.check import verify_cage
+from expert.verify.cage.escape import arc_meets_segment, drawn_in, escape_fault, segments_meet
 from expert.world.shape import Shape
 from expert.world.walls import segments
 
@@ -94,3 +95,30 @@ def test_arcs_meet_segments_where_sampled_arcs_do(
     nearest = np.clip(along, 0, 1)[:, None] * (b - a) + a
     if np.linalg.norm(arc - nearest, axis=1).min() > 0.05 and np.linalg.norm(b - a) > 0.05:
         assert not arc_meets_segment(p, pole, angle, a, b)
+
+
+def test_a_needle_is_no_hole() -> None:
+    """1 m by 10 nm, held by fingers that touch its ends and sides: thinner than the depth to which starts may be entered."""
+    half = 5e-9
+    needle = np.array([[-0.5, -half], [0.5, -half], [0.5, half], [-0.5, half]])
+    fingers = np.array([[-0.5, 0], [0.5, 0], [-0.3, half], [-0.3, -half], [0.3, half], [0.3, -half]])
+    scene = Arrangement(shape=Shape(vertices=needle), pose=np.zeros(3), fingers=fingers)
+    assert escape_fault(scene, np.array([[0, 0, 0], [0, 1, 0]], dtype=float)) is not None
+    assert verify_cage(scene).verdict == "unknown"
+
+
+def test_a_needle_that_leaves_along_itself_escapes() -> None:
+    needle = np.array([[-0.5, -5e-9], [0.5, -5e-9], [0.5, 5e-9], [-0.5, 5e-9]])
+    fingers = np.array([[-0.3, 0.001], [-0.3, -0.001], [0.3, 0.001], [0.3, -0.001]])
+    scene = Arrangement(shape=Shape(vertices=needle), pose=np.zeros(3), fingers=fingers)
+    assert escape_fault(scene, np.array([[0, 0, 0], [2, 0, 0]], dtype=float)) is None
+    assert escape_fault(scene, np.array([[0, 0, 0], [0, 2, 0]], dtype=float)) == "move 0 collides"
+
+
+def test_drawing_in_keeps_every_corner_or_says_so() -> None:
+    assert drawn_in(SQUARE, 1e-7, 1e-6).area == pytest.approx((2 - 2e-7) ** 2, rel=1e-12)
+    wedge = np.array([[0, -0.01], [1, 0], [0, 0.01]])  # its tip recedes by a hundred times the depth
+    assert drawn_in(wedge, 1e-7, 1e-6) is None
+    assert drawn_in(wedge, 1e-9, 1e-6) is not None
+    dumbbell = np.array([[-1, -1], [0, -1e-8], [1, -1], [1, 1], [0, 1e-8], [-1, 1]])
+    assert drawn_in(dumbbell, 1e-7, 1e-6) is None
