@@ -8,14 +8,22 @@ from expert.geometry.pose import Array, rotation, to_world
 from expert.problems.cage import Arrangement
 from expert.world.shape import Shape
 from expert.world.walls import segments
-from tests.support.polygons import random_polygon
+from tests.support.polygons import hard_polygon, random_polygon
 
 SIZE = 0.1
 
 
 def random_arrangement(rng: np.random.Generator) -> Arrangement:
     """A random polygon among 2-7 fingers that are scattered, hug it, or fence it in, and sometimes walls."""
-    vertices = random_polygon(rng, int(rng.integers(3, 11)), size=SIZE)
+    return _among(rng, random_polygon(rng, int(rng.integers(3, 11)), size=SIZE))
+
+
+def hard_arrangement(rng: np.random.Generator, family: str) -> Arrangement:
+    """The same for a polygon of a hard family."""
+    return _among(rng, SIZE * hard_polygon(rng, family))
+
+
+def _among(rng: np.random.Generator, vertices: Array) -> Arrangement:
     count = int(rng.integers(2, 8))
     place = (_scattered, _hugging, _hugging, _fence)[rng.integers(4)]
     fingers = place(rng, vertices, count)

@@ -136,3 +136,59 @@ def _sturdy(v: Array, radius: float) -> bool:
     cosines = (ahead * back).sum(axis=1) / (lengths * np.linalg.norm(back, axis=1))
     sharp, flat = cosines.max() > np.cos(np.radians(20)), cosines.min() < np.cos(np.radians(172))
     return bool(lengths.min() > 0.25 * radius and not sharp and not flat)
+
+
+def hard_polygon(rng: np.random.Generator, family: str) -> Array:
+    """Simple polygon (V, 2) about 1 large, of a family that is hard to cage and to free: slivers, combs, gears, spirals, rings."""
+    return {"sliver": _sliver, "comb": _comb, "gear": _gear, "spiral": _spiral, "ring": _ring}[family](rng)
+
+
+HARD = ("sliver", "comb", "gear", "spiral", "ring")
+
+
+def _sliver(rng: np.random.Generator) -> Array:
+    """A rectangle or triangle of length 1 and thickness 0.1 to 0.001."""
+    thickness = 10.0 ** rng.uniform(-3, -1)
+    box = np.array([[0, 0], [1, 0], [1, thickness], [0, thickness]])
+    return box if rng.random() < 0.5 else np.array([[0, 0], [1, 0], [rng.uniform(0, 1), thickness]])
+
+
+def _comb(rng: np.random.Generator) -> Array:
+    """Two to six teeth of random widths and gaps on a back."""
+    edges = rng.uniform(0.5, 1.5, 2 * int(rng.integers(2, 7)) - 1)
+    x = np.concatenate([[0.0], np.cumsum(edges)]) / edges.sum()
+    back, depth = rng.uniform(0.05, 0.3), rng.uniform(0.2, 0.9)
+    levels = back + depth * (np.arange(len(edges)) % 2 == 0)
+    top = np.column_stack([np.repeat(x, 2)[1:-1], np.repeat(levels, 2)])
+    return np.concatenate([[[0.0, 0.0], [1.0, 0.0]], top[::-1]])
+
+
+def _gear(rng: np.random.Generator) -> Array:
+    """Six to sixteen straight teeth."""
+    teeth = int(rng.integers(6, 17))
+    root, share = rng.uniform(0.6, 0.9), rng.uniform(0.3, 0.7)
+    turns = (np.arange(teeth)[:, None] + np.array([0.0, share, share, 1.0])).ravel() / teeth
+    radii = 0.5 * np.tile([1.0, 1.0, root, root], teeth)
+    return radii[:, None] * np.column_stack([np.cos(2 * np.pi * turns), np.sin(2 * np.pi * turns)])
+
+
+def _spiral(rng: np.random.Generator) -> Array:
+    """A band of 0.8 to 2.5 turns that leaves a gap of its own width or more between them."""
+    return spiral(rng.uniform(0.8, 2.5), share=rng.uniform(0.3, 0.6), corners=int(rng.integers(8, 15)))
+
+
+def spiral(turns: float, *, share: float, corners: int) -> Array:
+    """A band along r = 0.1 + 0.4 t / turns, t turns, that fills a share of the pitch; so many corners per turn and side."""
+    t = np.linspace(0, turns, max(int(turns * corners), 3) + 1)
+    pitch = 0.4 / turns
+    along = np.column_stack([np.cos(2 * np.pi * t), np.sin(2 * np.pi * t)])
+    inner, outer = (0.1 + pitch * t)[:, None] * along, (0.1 + pitch * (t + share))[:, None] * along
+    return np.concatenate([outer, inner[::-1]])
+
+
+def _ring(rng: np.random.Generator) -> Array:
+    """An annulus with an opening of 10 to 90 degrees."""
+    opening, inner = np.radians(rng.uniform(10, 90)), rng.uniform(0.5, 0.9)
+    t = np.linspace(0, 2 * np.pi - opening, int(rng.integers(12, 25)))
+    arc = 0.5 * np.column_stack([np.cos(t), np.sin(t)])
+    return np.concatenate([arc, inner * arc[::-1]])

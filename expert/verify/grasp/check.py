@@ -58,7 +58,7 @@ def verify(task: GraspProblem, answer: GraspSolution | None = None) -> GraspRepo
     """
     if answer is None:
         raise InvalidProblem("fingers", expected="paths to verify", got="nothing", remedy="solve it first")
-    if len(answer.path) == 0:
+    if len(answer.path) == 0 or answer.status in ("none_found", "time_limit"):
         raise InvalidProblem(
             "status", expected="finger paths", got=answer.status, remedy="there is no claim to check"
         )
