@@ -44,50 +44,52 @@ class VideoFile:
 
 
 def read_clip(video: str | Path | VideoFile, *, steps: int) -> Clip:
-    """The frames nearest to `steps` equally spaced times, each frame once.
+    """The frames nearest to `steps` equally spaced times, each frame once, with square pixels.
 
-    Raises InvalidProblem for what is no video, holds fewer than two frames, or not the times asked for.
+    Every frame counts at its own time stamp, whatever the file's mean rate is.  Raises InvalidProblem for what is no video,
+    holds fewer than two frames, or not the times asked for.
     """
     file = video if isinstance(video, VideoFile) else VideoFile(path=video)
-    path, start, end, rate = file.path, file.start, file.end, file.rate
-    require(Path(path).is_file(), "video", "a file", f"{path}, which is none")
-    count, stated = _measure(path)
-    rate = stated if rate is None else rate
-    require(0 < rate < 1e5, "rate", "frames per second", rate, "the file does not say: give rate=")
-    last = (count - 1) / rate
-    end = last if end is None else end
-    require(0 <= start < end, "start", f"a time before the end, {end:g} s", start)
-    require(end < last + 1 / rate, "end", f"a time within the clip, up to {last:g} s", end)
-    chosen = np.unique(np.rint(np.linspace(start, min(end, last), steps) * rate).astype(int))
+    require(Path(file.path).is_file(), "video", "a file", f"{file.path}, which is none")
+    times = _times(file)
+    last, gap = float(times[-1]), float(np.median(np.diff(times)))
+    end = last if file.end is None else file.end
+    require(0 <= file.start < end, "start", f"a time before the end, {end:g} s", file.start)
+    require(end < last + gap, "end", f"a time within the clip, up to {last:g} s", end)
+    wanted = np.linspace(file.start, min(end, last), steps)
+    chosen = np.unique(np.abs(times[:, None] - wanted).argmin(axis=0))
     require(len(chosen) >= 2, "video", "at least 2 frames between start and end", len(chosen), "widen them")
-    return Clip(frames=_read(path, chosen), times=(chosen - chosen[0]) / rate)
+    return Clip(frames=_read(file.path, chosen), times=times[chosen] - times[chosen[0]])
 
 
-def _measure(path: str | Path) -> tuple[int, float]:
-    """Frames that can be decoded, and the stated rate.  The stated count is not to be trusted."""
-    video = _open(path)
+def _times(file: VideoFile) -> Array:
+    """When each frame that can be decoded is shown (n,) [s], the first at 0.  The stated count of frames is not to be trusted."""
+    video, stamps = _open(file.path), []
     if not video.isOpened():
         raise InvalidProblem(
             "video",
             expected="a file that OpenCV can decode",
-            got=str(path),
+            got=str(file.path),
             remedy="convert it to mp4 or avi",
         )
     try:
-        count = 0
         while video.grab():
-            count += 1
-        rate = float(video.get(cv2.CAP_PROP_FPS))
+            stamps.append(1e-3 * video.get(cv2.CAP_PROP_POS_MSEC))
+        rate = float(video.get(cv2.CAP_PROP_FPS)) if file.rate is None else file.rate
     finally:
         video.release()
+    count, times = len(stamps), np.array(stamps) - (stamps[0] if stamps else 0.0)
     require(
         count >= 2,
         "video",
         "at least 2 frames",
-        f"{count} in {path}",
+        f"{count} in {file.path}",
         "a motion needs more than a picture" if count else "the file holds no frame that can be decoded",
     )
-    return count, rate
+    if file.rate is None and np.all(np.diff(times) > 0):
+        return times
+    require(0 < rate < 1e5, "rate", "frames per second", rate, "the file does not say: give rate=")
+    return np.arange(count) / rate
 
 
 def _open(path: str | Path) -> cv2.VideoCapture:
@@ -104,6 +106,7 @@ def _read(path: str | Path, chosen: np.ndarray) -> Frames:
     """Decoded frames of the given numbers, in order; the others pass by without filling the memory."""
     video, frames, wanted = _open(path), [], set(chosen.tolist())
     try:
+        across, down = video.get(cv2.CAP_PROP_SAR_NUM), video.get(cv2.CAP_PROP_SAR_DEN)
         for k in range(int(chosen[-1]) + 1):
             video.grab()
             if k in wanted:
@@ -112,4 +115,14 @@ def _read(path: str | Path, chosen: np.ndarray) -> Frames:
                 frames.append(cv2.cvtColor(image, cv2.COLOR_BGR2RGB))
     finally:
         video.release()
-    return np.stack(frames)
+    return np.stack([_squared(frame, across / down if across > 0 < down else 1.0) for frame in frames])
+
+
+def _squared(frame: Frames, ratio: float) -> Frames:
+    """With square pixels: as high as it was, and as many times as wide as its pixels are wider than high."""
+    height, width = frame.shape[:2]
+    wide = round(width * ratio)
+    if wide == width:
+        return frame
+    way = cv2.INTER_AREA if wide < width else cv2.INTER_LINEAR
+    return np.asarray(cv2.resize(frame, (wide, height), interpolation=way), dtype=np.uint8)

@@ -17,9 +17,9 @@ def drawn(vertices: Array, poses: Array, palette: Palette | None = None) -> Fram
     return render(vertices, poses, CAMERA, palette)
 
 
-def write_clip(path: Path, frames: Frames, rate: float = 10.0) -> Path:
+def write_clip(path: Path, frames: Frames, rate: float = 10.0, codec: str = "mp4v") -> Path:
     height, width = frames.shape[1:3]
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), rate, (width, height))
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*codec), rate, (width, height))
     for frame in frames:
         writer.write(np.ascontiguousarray(frame[..., ::-1]))
     writer.release()
