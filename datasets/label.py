@@ -1,14 +1,15 @@
 """Labels: the expert's plan for a task, held against the independent checker before anybody may learn from it."""
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
+from datasets.limits import Number, check_numbers
 from expert.contact import solve
 from expert.errors import SolverFailed
 from expert.problems.contact import ContactTask, Plan
 from expert.verify.plan.check import check_plan
-from expert.world.values import require
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,12 +19,11 @@ class Labelling:
     gap: relative gap at which the branch-and-bound stops.  node_limit: nodes per attempt.
     """
 
-    gap: float = 1e-3
-    node_limit: int = 2000
+    gap: Annotated[float, Number(above=0, most=0.99)] = 1e-3
+    node_limit: Annotated[int, Number(whole=True, least=1)] = 2000
 
     def __post_init__(self) -> None:
-        require(0 < self.gap < 1, "labelling.gap", "a number between 0 and 1", self.gap)
-        require(self.node_limit >= 1, "labelling.node_limit", "at least 1", self.node_limit)
+        check_numbers(self, "labelling.")
 
 
 @dataclass(frozen=True, kw_only=True)

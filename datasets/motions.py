@@ -5,9 +5,11 @@ Six families: slide, pivot about a ground vertex, lift, lift and rotate, slide t
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
+from datasets.limits import Number, check_numbers
 from datasets.shapes import ShapeFamily, Shapes, stable_angles
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, rotation, to_world
@@ -195,23 +197,22 @@ class TaskSettings:
     clearance [m]: see Fingers.  The rest: see Robustness; least_push is its min_normal_force over m g.
     """
 
-    mass: float = 0.1
-    friction: float = 0.5
-    gravity: float = 9.81
-    steps: int = 5
-    dt: float = 0.1
-    fingers: int = 2
-    force_limit: float = 10.0
-    facet_margin: float = 0.05
-    clearance: float = 0.005
-    cone_fraction: float = 0.7
-    support_inset: float = 0.3
-    min_interval: int = 2
-    least_push: float = 0.04
+    mass: Annotated[float, Number(unit="kilograms", above=0, most=1e6)] = 0.1
+    friction: Annotated[float, Number(above=0, most=100)] = 0.5
+    gravity: Annotated[float, Number(unit="m/s^2", above=0, most=1e4)] = 9.81
+    steps: Annotated[int, Number(whole=True, least=5, most=1001)] = 5
+    dt: Annotated[float, Number(unit="seconds", above=0, most=1e4)] = 0.1
+    fingers: Annotated[int, Number(whole=True, least=1, most=8)] = 2
+    force_limit: Annotated[float, Number(above=0, most=1e6)] = 10.0
+    facet_margin: Annotated[float, Number(least=0, most=0.49)] = 0.05
+    clearance: Annotated[float, Number(unit="metres", least=0, most=1)] = 0.005
+    cone_fraction: Annotated[float, Number(above=0, most=1)] = 0.7
+    support_inset: Annotated[float, Number(least=0, most=0.99)] = 0.3
+    min_interval: Annotated[int, Number(whole=True, least=1, most=1000)] = 2
+    least_push: Annotated[float, Number(least=0, most=1e6)] = 0.04
 
     def __post_init__(self) -> None:
-        require(0 < self.mass < np.inf, "tasks.mass", "a positive number of kilograms", self.mass)
-        require(0 < self.dt < np.inf, "tasks.dt", "a positive number of seconds", self.dt)
+        check_numbers(self, "tasks.")
         _check_steps(self.steps, "tasks.steps")
         self.environment(), self.point_fingers(), self.robustness()  # each checks its own part
 

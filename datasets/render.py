@@ -4,11 +4,14 @@ Colour is blended by the share of the pixel that each thing covers, so that a fr
 a pixel: OpenCV fills the polygon on a grid `SUPERSAMPLING` times finer, and the mean over each pixel is its coverage.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Annotated
 
 import cv2
 import numpy as np
 
+from datasets.limits import Number, check_numbers
 from expert.geometry.polygon import facet_frames
 from expert.geometry.pose import Array, to_world
 from expert.world.values import require
@@ -29,21 +32,15 @@ class Camera:
     the floor's surface y = 0 [m].  Pixel coordinates (column, row) are continuous, (0, 0) at the upper left corner.
     """
 
-    size: int = 50
-    scale: float = 0.004
-    centre: float = 0.0
-    below: float = 0.02
+    size: Annotated[int, Number(unit="pixels", whole=True, least=4, most=4096)] = 50
+    scale: Annotated[float, Number(unit="metres per pixel", above=0, most=1e6)] = 0.004
+    centre: Annotated[float, Number(unit="metres")] = 0.0
+    below: Annotated[float, Number(unit="metres", least=0)] = 0.02
 
     def __post_init__(self) -> None:
-        require(4 <= self.size <= 4096, "camera.size", "4 to 4096 pixels", self.size)
-        require(0 < self.scale < np.inf, "camera.scale", "a positive number of metres per pixel", self.scale)
-        require(abs(self.centre) < np.inf, "camera.centre", "a finite length", self.centre)
-        require(
-            0 <= self.below < self.size * self.scale,
-            "camera.below",
-            "less than the view's height",
-            self.below,
-        )
+        check_numbers(self, "camera.")
+        height = self.size * self.scale
+        require(self.below < height, "camera.below", "less than the view's height", self.below)
 
     def to_pixels(self, points_w: Array) -> Array:
         """World points (..., 2) [m] in pixels (column, row)."""
@@ -69,14 +66,18 @@ class Palette:
 
     def __post_init__(self) -> None:
         for name in ("background", "object", "ground"):
-            colour = tuple(int(c) for c in getattr(self, name))
-            require(
-                len(colour) == 3 and 0 <= min(colour) <= max(colour) <= 255,
-                f"palette.{name}",
-                "three integers from 0 to 255",
-                colour,
-            )
-            object.__setattr__(self, name, colour)
+            object.__setattr__(self, name, checked_colour(getattr(self, name), f"palette.{name}"))
+
+
+def checked_colour(colour: object, field: str) -> Colour:
+    """As RGB.  Raises InvalidProblem for anything but three integers from 0 to 255."""
+    numbers = tuple(colour) if isinstance(colour, Iterable) and not isinstance(colour, str) else ()
+    level = Number(whole=True, least=0, most=255)
+    require(
+        len(numbers) == 3 and all(map(level.holds, numbers)), field, "three integers from 0 to 255", colour
+    )
+    red, green, blue = (int(n) for n in numbers)
+    return red, green, blue
 
 
 def render(

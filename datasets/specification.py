@@ -3,10 +3,12 @@
 import dataclasses
 import zlib
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from datasets.label import Labelling, Refusal, label
+from datasets.limits import Number, check_numbers
 from datasets.motions import FAMILIES, NoRoom, TaskSettings, sample_task
 from datasets.parameters import MechanicalParameters, parameters_of
 from datasets.render import Camera, Frames, Palette, render
@@ -27,8 +29,8 @@ class Specification:
     """
 
     name: str
-    count: int
-    shard: int = 4
+    count: Annotated[int, Number(whole=True, least=1, most=10**7)]
+    shard: Annotated[int, Number(whole=True, least=1, most=10**4)] = 4
     shapes: ShapeFamily = field(default_factory=Shapes)
     tasks: TaskSettings = field(default_factory=TaskSettings)
     camera: Camera = field(default_factory=Camera)
@@ -39,14 +41,7 @@ class Specification:
         require(
             isinstance(self.name, str) and self.name.isidentifier(), "dataset.name", "one word", self.name
         )
-        for name, most in (("count", 10**7), ("shard", 10**4)):
-            value = getattr(self, name)
-            require(
-                isinstance(value, int) and 1 <= value <= most,
-                f"dataset.{name}",
-                f"a whole number from 1 to {most}",
-                value,
-            )
+        check_numbers(self, "dataset.")
 
     @property
     def shards(self) -> int:

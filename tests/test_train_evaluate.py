@@ -293,7 +293,7 @@ WRONG: dict[str, tuple[Callable[[], None], list[str], str]] = {
     "unknown option": (TRAIN, [SMOKE, "iterations=5"], r"iterations"),
     "unknown torque": (TRAIN, [SMOKE, "solver.torque=exact"], r"torque: expected first_order or thesis, got exact"),
     "too few tasks": (TRAIN, [SMOKE, "train_tasks=5"], r"train_tasks: expected a whole number from 2 to 4, got 5"),
-    "no iterations": (TRAIN, [SMOKE, "schedule.iterations=0"], r"iterations: expected a whole number >= 1, got 0"),
+    "no iterations": (TRAIN, [SMOKE, "schedule.iterations=0"], r"iterations: expected a whole number from 1 on, got 0"),
     "negative kappa": (TRAIN, [SMOKE, "simulator.kappa=-1"], r"kappa: expected a positive number"),
     "missing data": (TRAIN, ["stage=nn", BAD], r"data/train-seed0.*python -m datasets\.generate"),
     "empty data": (TRAIN, [SMOKE, "stage=nn", "data.train=empty", BAD], r"at least one shard"),

@@ -3,14 +3,17 @@
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import cv2
 import numpy as np
 
+from datasets.limits import Number, check_numbers
 from datasets.render import Frames
+from dlm.perception.video import check_frames
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
-from expert.world.values import require
+from expert.world.values import readonly, require
 
 os.environ.setdefault(
     "OPENCV_FFMPEG_LOGLEVEL", "-8"
@@ -23,6 +26,13 @@ class Clip:
 
     frames: Frames
     times: Array
+
+    def __post_init__(self) -> None:
+        check_frames(self.frames)
+        times = readonly(self.times, (None,), "times")
+        rising = len(times) == len(self.frames) and bool(np.all(np.diff(times) > 0))
+        require(rising, "times", f"{len(self.frames)} rising times, one for each frame", times.tolist())
+        object.__setattr__(self, "times", times - times[0])
 
     @property
     def duration(self) -> float:
@@ -38,9 +48,13 @@ class VideoFile:
     """
 
     path: str | Path
-    start: float = 0.0
-    end: float | None = None
-    rate: float | None = None
+    start: Annotated[float, Number(unit="seconds", least=0)] = 0.0
+    end: Annotated[float | None, Number(unit="seconds", above=0)] = None
+    rate: Annotated[float | None, Number(unit="frames per second", above=0, most=1e5)] = None
+
+    def __post_init__(self) -> None:
+        check_numbers(self)
+        require(isinstance(self.path, str | Path), "video", "the name of a file", self.path)
 
 
 def read_clip(video: str | Path | VideoFile, *, steps: int) -> Clip:
@@ -118,11 +132,11 @@ def _read(path: str | Path, chosen: np.ndarray) -> Frames:
     return np.stack([_squared(frame, across / down if across > 0 < down else 1.0) for frame in frames])
 
 
-def _squared(frame: Frames, ratio: float) -> Frames:
+def _squared(frame: np.ndarray, ratio: float) -> np.ndarray:
     """With square pixels: as high as it was, and as many times as wide as its pixels are wider than high."""
     height, width = frame.shape[:2]
     wide = round(width * ratio)
     if wide == width:
         return frame
     way = cv2.INTER_AREA if wide < width else cv2.INTER_LINEAR
-    return np.asarray(cv2.resize(frame, (wide, height), interpolation=way), dtype=np.uint8)
+    return np.asarray(cv2.resize(frame, (wide, height), interpolation=way))

@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import shapely
 
+from datasets.limits import Number, check_numbers
 from datasets.motions import TaskSettings
 from dlm.infer.clip import Clip, VideoFile, read_clip
 from dlm.infer.segmentation import Segmentation
@@ -42,12 +43,12 @@ class Given:
     of fingers and floor alike.  duration [s] that the motion is to take; None: as in the video.
     """
 
-    scale: float | None = None
-    object_size: float | None = None
-    floor: float | None = None
-    mass: float = 0.1
-    friction: float = 0.5
-    duration: float | None = None
+    scale: Annotated[float | None, Number(unit="metres per pixel", above=0, most=1e6)] = None
+    object_size: Annotated[float | None, Number(unit="metres", above=0, most=1e6)] = None
+    floor: Annotated[float | None, Number(unit="pixels")] = None
+    mass: Annotated[float, Number(unit="kilograms", above=0, most=1e6)] = 0.1
+    friction: Annotated[float, Number(above=0, most=100)] = 0.5
+    duration: Annotated[float | None, Number(unit="seconds", above=0, most=1e6)] = None
 
     def __post_init__(self) -> None:
         known = (self.scale is None) + (self.object_size is None)
@@ -58,9 +59,7 @@ class Given:
             "neither" if known == 2 else "both",
             "give one of them",
         )
-        for name in ("scale", "object_size", "duration"):
-            value = getattr(self, name)
-            require(value is None or 0 < value < np.inf, name, "a positive number", value)
+        check_numbers(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,6 +125,8 @@ def infer(
     model = model or StructuredModel(planner=ClassPlanner(trial=Trial()))
     model = replace(model, perception=replace(model.perception, codec=CODEC))
     steps = model.planning.tasks.steps
+    known = isinstance(video, str | Path | VideoFile | Clip)
+    require(known, "video", "a file, or Clip(frames=..., times=...)", type(video).__name__)
     clip = video if isinstance(video, Clip) else read_clip(video, steps=steps)
     view, seen = look(clip, given, segmentation or Segmentation(), model.perception)
     planning = replace(model.planning, tasks=tasks_of(model.planning.tasks, given, clip))

@@ -5,12 +5,14 @@ Either way the frames are painted anew, plain object on plain ground, which is w
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import cv2
 import numpy as np
 from PIL import Image
 
-from datasets.render import Frames, Palette
+from datasets.limits import Number, check_numbers
+from datasets.render import Frames, Palette, checked_colour
 from expert.errors import InvalidProblem
 from expert.world.values import require
 
@@ -27,17 +29,15 @@ class Segmentation:
 
     colour: tuple[int, int, int] | None = None
     background: str | Path | None = None
-    tolerance: float = 60.0
-    least: float = 1e-3
+    tolerance: Annotated[float, Number(unit="grey levels", above=0, most=441)] = 60.0
+    least: Annotated[float, Number(least=0, most=1)] = 1e-3
 
     def __post_init__(self) -> None:
         both = self.colour is not None and self.background is not None
         require(not both, "segmentation", "colour or background", "both", "give one of them")
-        require(0 < self.tolerance < 442, "segmentation.tolerance", "0 to 441 grey levels", self.tolerance)
+        check_numbers(self, "segmentation.")
         if self.colour is not None:
-            colour = tuple(int(c) for c in self.colour)
-            ok = len(colour) == 3 and 0 <= min(colour) <= max(colour) <= 255
-            require(ok, "segmentation.colour", "three integers from 0 to 255", colour)
+            checked_colour(self.colour, "segmentation.colour")
 
     def paint(self, frames: Frames, floor: float) -> Frames:
         """Frames (T, h, w, 3) with a plain object, a plain background, and plain ground below row `floor`."""

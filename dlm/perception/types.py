@@ -1,12 +1,10 @@
 """What perception is told, and what it answers."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
-import numpy as np
-
+from datasets.limits import Number, check_numbers
 from expert.geometry.pose import Array
-from expert.world.values import require
 
 Status = Literal["ok", "poor_fit"]
 
@@ -23,23 +21,14 @@ class PerceptionSettings:
     """
 
     floor: bool = True
-    blur: float = 0.0
-    codec: float = 0.0
-    most_vertices: int = 16
-    snap: float = 0.25
-    tolerance: float = 2.0
+    blur: Annotated[float, Number(unit="pixels", least=0, most=5)] = 0.0
+    codec: Annotated[float, Number(unit="grey levels", least=0, most=100)] = 0.0
+    most_vertices: Annotated[int, Number(whole=True, least=3, most=64)] = 16
+    snap: Annotated[float, Number(unit="pixels", least=0, most=2)] = 0.25
+    tolerance: Annotated[float, Number(above=0)] = 2.0
 
     def __post_init__(self) -> None:
-        require(0 <= self.blur <= 5, "perception.blur", "0 to 5 pixels", self.blur)
-        require(0 <= self.codec <= 100, "perception.codec", "0 to 100 grey levels", self.codec)
-        require(
-            3 <= self.most_vertices <= 64,
-            "perception.most_vertices",
-            "a number from 3 to 64",
-            self.most_vertices,
-        )
-        require(0 <= self.snap <= 2, "perception.snap", "0 to 2 pixels", self.snap)
-        require(0 < self.tolerance < np.inf, "perception.tolerance", "a positive number", self.tolerance)
+        check_numbers(self, "perception.")
 
 
 @dataclass(frozen=True, kw_only=True)

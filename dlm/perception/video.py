@@ -8,6 +8,18 @@ from expert.errors import InvalidProblem
 
 def check_video(video: Frames, camera: Camera) -> None:
     """Raises InvalidProblem unless this is a video for that camera."""
+    check_frames(video)
+    if video.shape[1:3] != (camera.size, camera.size):
+        raise InvalidProblem(
+            "video",
+            expected=f"frames of {camera.size} x {camera.size} pixels as the camera's",
+            got=f"{video.shape[2]} x {video.shape[1]}",
+            remedy="resize the frames or give their camera",
+        )
+
+
+def check_frames(video: Frames) -> None:
+    """Raises InvalidProblem unless these are two RGB frames at least."""
     if not isinstance(video, np.ndarray) or video.ndim != 4 or video.shape[-1] != 3:
         got = f"shape {video.shape}" if isinstance(video, np.ndarray) else type(video).__name__
         raise InvalidProblem(
@@ -24,11 +36,4 @@ def check_video(video: Frames, camera: Camera) -> None:
     if len(video) < 2:
         raise InvalidProblem(
             "video", expected="at least 2 frames", got=f"{len(video)}", remedy="give a longer clip"
-        )
-    if video.shape[1:3] != (camera.size, camera.size):
-        raise InvalidProblem(
-            "video",
-            expected=f"frames of {camera.size} x {camera.size} pixels as the camera's",
-            got=f"{video.shape[2]} x {video.shape[1]}",
-            remedy="resize the frames or give their camera",
         )

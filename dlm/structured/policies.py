@@ -2,12 +2,15 @@
 checked (CVX, DLM)."""
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
+from datasets.limits import Number, check_numbers
 from datasets.render import Camera, Frames
 from dlm.inverse_dynamics.layer import Action, InverseDynamics
 from dlm.perception import Perceived, PerceptionSettings, perceive
@@ -146,9 +149,9 @@ class StructuredArchitecture:
     """
 
     name: str = "structured"
-    width: int = 96
-    layers: int = 3
-    heads: int = 4
+    width: Annotated[int, Number(whole=True, least=1, most=10**4)] = 96
+    layers: Annotated[int, Number(whole=True, least=1, most=100)] = 3
+    heads: Annotated[int, Number(whole=True, least=1, most=1000)] = 4
     widths: tuple[int, ...] = (8, 64)
     schedules: tuple[str, ...] = MEASURED
     planning: Planning = field(default_factory=Planning)
@@ -156,9 +159,15 @@ class StructuredArchitecture:
     perception: PerceptionSettings = field(default_factory=PerceptionSettings)
 
     def __post_init__(self) -> None:
-        widths = tuple(self.widths)
+        check_numbers(self, "model.")
+        require(
+            self.width % self.heads == 0, "model.width", f"a multiple of heads = {self.heads}", self.width
+        )
+        ranks = self.widths if isinstance(self.widths, Sequence) else ()
+        fits = all(Number(whole=True, least=1).holds(rank) for rank in ranks)
+        widths = tuple(ranks) if fits else ()
         rising = all(a < b for a, b in zip((0, *widths), widths, strict=False))
-        require(len(widths) > 0 and rising, "model.widths", "rising ranks of at least 1", list(widths))
+        require(len(widths) > 0 and rising, "model.widths", "rising ranks of at least 1", self.widths)
         object.__setattr__(self, "widths", widths)
 
     def build(self, kind: PolicyKind, program: InverseDynamics | None = None, *, seed: int = 0) -> Policy:

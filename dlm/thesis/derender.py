@@ -1,13 +1,17 @@
 """Mechanical derendering: from video frames to mechanical parameters (Thesis 4-CT3, 4-CT4)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain, pairwise
 from math import ceil, prod
+from typing import Annotated
 
 import torch
 from torch import Tensor, nn
 
+from datasets.limits import Number, check_numbers
 from dlm.inverse_dynamics.parameters import FLAGS, Layout, ParameterBatch
+from expert.world.values import require
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,12 +19,19 @@ class NetworkSizes:
     """Sizes of the thesis's networks; every fully connected hidden layer is as wide as its input."""
 
     channels: tuple[int, ...] = (6, 12, 24)
-    latent: int = 75
-    recurrent_layers: int = 5
-    hidden_layers: int = 3
-    dropout: float = 0.2
-    pixels: int = 50
-    steps: int = 5
+    latent: Annotated[int, Number(whole=True, least=1, most=10**5)] = 75
+    recurrent_layers: Annotated[int, Number(whole=True, least=1, most=100)] = 5
+    hidden_layers: Annotated[int, Number(whole=True, least=0, most=100)] = 3
+    dropout: Annotated[float, Number(least=0, most=0.99)] = 0.2
+    pixels: Annotated[int, Number(whole=True, least=4, most=4096)] = 50
+    steps: Annotated[int, Number(whole=True, least=3, most=1001)] = 5
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "model.sizes.")
+        numbers = self.channels if isinstance(self.channels, Sequence) else ()
+        fits = len(numbers) > 0 and all(Number(whole=True, least=1, most=10**4).holds(n) for n in numbers)
+        require(fits, "model.sizes.channels", "whole numbers of at least 1", self.channels)
+        object.__setattr__(self, "channels", tuple(numbers))
 
 
 def perceptron(inputs: int, outputs: int, sizes: NetworkSizes) -> nn.Sequential:

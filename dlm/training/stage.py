@@ -2,29 +2,25 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
+from datasets.limits import Number, check_numbers
 from dlm.policy import Loss, PolicyKind
-from expert.world.values import require
 
 
 @dataclass(frozen=True, kw_only=True)
 class Schedule:
     """iterations: passes over the tasks.  log_every, save_every: iterations between curve points and between checkpoints."""
 
-    iterations: int = 100
-    batch_size: int = 5
-    learning_rate: float = 1e-4
-    log_every: int = 5
-    save_every: int = 5
-    seed: int = 0
+    iterations: Annotated[int, Number(whole=True, least=1)] = 100
+    batch_size: Annotated[int, Number(unit="tasks", whole=True, least=2)] = 5
+    learning_rate: Annotated[float, Number(above=0, most=1)] = 1e-4
+    log_every: Annotated[int, Number(whole=True, least=1)] = 5
+    save_every: Annotated[int, Number(whole=True, least=1)] = 5
+    seed: Annotated[int, Number(whole=True, least=0, most=2**63 - 1)] = 0
 
     def __post_init__(self) -> None:
-        for name in ("iterations", "log_every", "save_every"):
-            value = getattr(self, name)
-            require(isinstance(value, int) and value >= 1, name, "a whole number >= 1", value)
-        require(self.batch_size >= 2, "batch_size", "at least 2, for batch norm", self.batch_size)
-        require(0 < self.learning_rate < 1, "learning_rate", "a number in (0, 1)", self.learning_rate)
+        check_numbers(self)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,7 @@ BAD = {
     "unknown backend": (["backend=slurm"], "backend: expected loky or ray, got slurm"),
     "no task": (["dataset.count=0"], "dataset.count: expected a whole number from 1 to 10000000, got 0"),
     "two-sided polygon": (["dataset.shapes.facets=[2,3]"], "shapes.facets: expected whole numbers 3 <= least"),
-    "negative mass": (["dataset.tasks.mass=-0.1"], "tasks.mass: expected a positive number of kilograms, got -0.1"),
+    "negative mass": (["dataset.tasks.mass=-0.1"], "tasks.mass: expected a positive number of kilograms, at most 1000000, got -0.1"),
     "negative friction": (["dataset.tasks.friction=-1"], "friction: expected"),
     "blind camera": (["dataset.camera.scale=nan"], "camera.scale: expected a positive number"),
     "folder of other things": (["out={other}"], "out: expected a new or empty folder, or a data set, got"),

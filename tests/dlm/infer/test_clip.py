@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from dlm.infer import VideoFile, read_clip
+from dlm.infer import Clip, VideoFile, read_clip
 from expert.errors import InvalidProblem
 from tests.support.clips import write_clip
 
@@ -100,7 +100,45 @@ def test_times_that_are_not_there_are_refused(tmp_path: Path) -> None:
             VideoFile(path=path, start=0.061, end=0.1),
             "video: expected at least 2 frames between start and end",
         ),
-        (VideoFile(path=path, rate=-1.0), "rate: expected frames per second"),
     ):
         with pytest.raises(InvalidProblem, match=words):
             read_clip(file, steps=5)
+
+
+RGB = plain(GREY)
+BAD = {
+    "greyscale": ({"frames": RGB[..., 0]}, r"video: expected an array \(T, height, width, 3\), got shape \(6, 40, 60\)"),
+    "float": ({"frames": RGB / 255}, "video: expected uint8 grey levels from 0 to 255, got float64"),
+    "a list": ({"frames": [1, 2]}, r"video: expected an array .*, got list"),
+    "one frame": ({"frames": RGB[:1], "times": [0.0]}, "video: expected at least 2 frames, got 1"),
+    "too few times": ({"times": LATER[:5]}, "times: expected 6 rising times, one for each frame, got"),
+    "falling times": ({"times": LATER[::-1]}, "times: expected 6 rising times"),
+    "no times": ({"times": None}, "times: expected numbers"),
+    "nan": ({"times": [*LATER[:5], np.nan]}, "times: expected finite numbers"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_clip_is_rgb_frames_with_their_times(name: str) -> None:
+    changed, words = BAD[name]
+    with pytest.raises(InvalidProblem, match=words) as refusal:
+        Clip(**{"frames": RGB, "times": np.array(LATER), **changed})  # type: ignore[arg-type]
+    assert "\n" not in str(refusal.value)
+    assert Clip(frames=RGB, times=np.array(LATER) + 7).times.tolist() == pytest.approx(LATER)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("start", -1.0),
+        ("start", "soon"),
+        ("end", 0),
+        ("end", np.nan),
+        ("rate", 0),
+        ("rate", -1.0),
+        ("rate", True),
+    ],
+)
+def test_times_of_a_file_are_numbers(field: str, value: object) -> None:
+    with pytest.raises(InvalidProblem, match=f"^{field}: expected a .*number of .*, got"):
+        VideoFile(path="x.mp4", **{field: value})  # type: ignore[arg-type]

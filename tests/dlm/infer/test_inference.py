@@ -94,8 +94,22 @@ def test_more_or_fewer_frames_than_steps_are_resampled(tasks: TaskBatch, tmp_pat
         ({"scale": 0.001, "object_size": 0.1}, "both"),
         ({"scale": -1.0}, "scale: expected a positive number"),
         ({"scale": 0.001, "duration": 0.0}, "duration"),
+        (
+            {"scale": 0.001, "mass": -1.0},
+            "mass: expected a positive number of kilograms, at most 1000000, got -1.0",
+        ),
+        ({"scale": 0.001, "friction": 0.0}, "friction: expected a positive number, at most 100, got 0.0"),
+        ({"scale": 0.001, "floor": float("nan")}, "floor: expected a number of pixels, got nan"),
+        ({"scale": "1 mm"}, "scale: expected a positive number of metres per pixel, .* got '1 mm'"),
     ],
 )
 def test_a_scene_says_what_a_video_cannot(scene: dict[str, float], field: str) -> None:
     with pytest.raises(InvalidProblem, match=field):
         Given(**scene)
+
+
+def test_frames_without_their_times_are_no_clip(tasks: TaskBatch) -> None:
+    with pytest.raises(
+        InvalidProblem, match=r"video: expected a file, or Clip\(frames=..., times=...\), got ndarray"
+    ):
+        infer(tasks.samples[0].video, KNOWN)  # type: ignore[arg-type]
