@@ -7,7 +7,7 @@ import argparse
 import json
 from pathlib import Path
 
-from dlm.infer import Scene, infer
+from dlm.infer import Given, infer
 from dlm.infer.drawing import draw_inference
 
 HERE = Path(__file__).resolve().parent
@@ -17,7 +17,7 @@ parser.add_argument("--video", type=Path, default=HERE.parent / "docs/examples/p
 parser.add_argument("--scale", type=float, default=0.001, help="metres per pixel")
 options = parser.parse_args()
 
-answer = infer(options.video, Scene(scale=options.scale, mass=0.1, friction=0.5))
+answer = infer(options.video, Given(scale=options.scale, mass=0.1, friction=0.5))
 print(f"{answer.status} {answer.reason}".strip())
 options.output.mkdir(parents=True, exist_ok=True)
 draw_inference(answer, options.output / "motion.gif")

@@ -43,7 +43,7 @@ class FacetGeometry(SweptGeometry):
 
 
 def schedule(half_ranges: Array, margin: float) -> list[Knot]:
-    """Knots of a path: at knot k the object arrives within half_ranges[k - 1] and leaves within half_ranges[k]."""
+    """Knots of a path: at knot k the object arrives within half_ranges[k - 1] and leaves within half_ranges[k] (5-CT15)."""
     knots = []
     for k, limit in enumerate(half_ranges):
         reach = half_ranges[max(k - 1, 0)]
@@ -114,7 +114,7 @@ class NestedCages(LoopModel):
         return self.geometry.table
 
     def _observability(self) -> None:
-        """First-order form closure, which 5-CT17..19 fall short of: z = 1 => moments of both senses at the last knot.
+        """First-order form closure, which 5-CT17, 5-CT18, 5-CT19 fall short of: z = 1 => moments of both senses at the last knot.
 
         Three fingers hold by curvature where their normals meet: no moment.
         """

@@ -30,7 +30,7 @@ Name = Literal["miqp1", "miqp2"]
 
 
 def finish(model: NestedCages, name: Name) -> None:
-    """The objective, as a quadratic program."""
+    """The objective of 5-MIQP1, or of 5-MIQP2, as a quadratic program."""
     model.minimise_acceleration()
     if name == "miqp2":
         model.milp.minimise(-model.common_alpha())

@@ -20,13 +20,14 @@ from rich.table import Table
 
 from dlm.evaluation.outcomes import Outcome, act, execute
 from dlm.evaluation.settle import settle
+from dlm.evaluation.trained import read_trained
 from dlm.execution import idle_action
 from dlm.policy import Policy
 from dlm.simulator import SimulatorSettings
 from dlm.structured.policies import ProposalPolicy
 from dlm.tasks import TaskBatch
 from dlm.training.checkpoint import read_about
-from evaluate import load_policy
+from evaluate import build
 
 ROOT = Path(__file__).resolve().parents[2]
 BATCH, STEPS = 20, 1000
@@ -87,7 +88,7 @@ def policies(model: str, size: int, options: argparse.Namespace) -> dict[str, Po
     if model == "thesis" and options.batch_norm == "settled":
         seen = TaskBatch.read(options.train, min(size, SETTLING))
     for stage in STAGES[model]:
-        policy = load_policy(folder(model, size, options), stage, 0)[1]
+        policy = read_trained(folder(model, size, options), stage, [0], build).policies[0]
         if seen is not None:
             settle(policy, seen)
         found[TITLES.get((model, stage), stage.upper())] = policy
