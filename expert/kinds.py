@@ -4,23 +4,10 @@ Imports stand inside the functions, so that a checker never loads a solver, and 
 """
 
 import os
-from typing import Any, Protocol
+from typing import Any
 
 from expert.errors import InvalidProblem
-
-
-class Report(Protocol):
-    """What a checker answers."""
-
-    @property
-    def verdict(self) -> str:
-        """sound, caged, certified, refuted, escapes or unknown."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain JSON values, the certificate."""
-
-    def __str__(self) -> str:
-        """Lines for a reader."""
+from expert.verify.report import Report
 
 
 class Kind:

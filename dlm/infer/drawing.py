@@ -8,19 +8,8 @@ from matplotlib.axes import Axes
 
 from dlm.infer.inference import Inference
 from dlm.simulator.replay import Replay
-from expert.drawing.canvas import (
-    EDGE,
-    FINGER,
-    FINGER_FORCE,
-    OBJECT,
-    Image8,
-    draw_arrow,
-    draw_wall,
-    new_figure,
-    pixels,
-    plain_axes,
-    save_frames,
-)
+from expert.drawing.canvas import Image8, new_figure, pixels, plain_axes, save_frames
+from expert.drawing.marks import EDGE, FINGER, FINGER_FORCE, OBJECT, draw_arrow, draw_half_plane
 from expert.geometry.pose import Array, to_world
 from expert.problems.contact import ContactTask, Plan
 
@@ -80,9 +69,8 @@ def _draw_simulation(axes: Axes, answer: Inference, i: int) -> None:
         axes.set_title(f"no plan: {answer.reason}"[:60], fontsize=9)
         return
     task, result = answer.task, answer.result
-    low, high = _box(answer)
     for wall in task.environment.walls:
-        draw_wall(axes, wall, 2 * float(np.abs([low - wall.point, high - wall.point]).max()))
+        draw_half_plane(axes, wall)
     axes.fill(*to_world(result.substep_poses[i], task.body.vertices).T, color=OBJECT, ec=EDGE, lw=1, zorder=2)
     _outline(axes, to_world(result.desired[i], task.body.vertices), "--", EDGE)
     axes.plot(*result.fingers[i].T, "o", color=FINGER, ms=5, zorder=5)

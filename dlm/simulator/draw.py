@@ -8,15 +8,8 @@ from matplotlib.axes import Axes
 
 from dlm.simulator.replay import Replay
 from expert.drawing.canvas import (
-    EDGE,
-    FINGER,
-    FINGER_FORCE,
     MOVING,
-    OBJECT,
-    REACTION,
     Image8,
-    draw_arrow,
-    draw_wall,
     new_figure,
     pixels,
     plain_axes,
@@ -24,6 +17,7 @@ from expert.drawing.canvas import (
     save_frames,
     suffix,
 )
+from expert.drawing.marks import EDGE, FINGER, FINGER_FORCE, OBJECT, REACTION, draw_arrow, draw_half_plane
 from expert.geometry.pose import Array, to_world
 from expert.problems.contact import ContactTask
 
@@ -67,7 +61,7 @@ def _draw_moment(axes: Axes, task: ContactTask, replay: Replay, i: int) -> None:
     low, high = _view(task, replay)
     plain_axes(axes, low, high)
     for wall in task.environment.walls:
-        draw_wall(axes, wall, 2 * float(np.abs([low - wall.point, high - wall.point]).max()))
+        draw_half_plane(axes, wall)
     axes.fill(*to_world(replay.substep_poses[i], task.body.vertices).T, color=OBJECT, ec=EDGE, lw=1, zorder=2)
     wanted = to_world(replay.desired[i], task.body.vertices)
     axes.plot(*np.concatenate([wanted, wanted[:1]]).T, "--", color=EDGE, lw=0.7, zorder=3)

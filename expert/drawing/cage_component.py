@@ -6,13 +6,12 @@ from matplotlib import colormaps
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-from expert.drawing.canvas import FINGER
+from expert.drawing.marks import FINGER, LABEL, NUMBER, PATH
 from expert.geometry.pose import Array
 from expert.problems.cage import Arrangement
 from expert.verify.cage.report import CageReport
 from expert.world.slices import free_components
 
-PATH = "#1f5fbf"
 SLICES = 49
 MILLIMETRES = 1e3
 
@@ -23,17 +22,17 @@ def draw_component(axes: Axes3D, arrangement: Arrangement, report: CageReport) -
         low, high = report.rotation_range
         limits = (low, high) if np.isfinite(low) else (-np.pi, np.pi)
         _stack_slices(axes, arrangement, _occupied(arrangement, np.linspace(*limits, SLICES)))
-        axes.set_title("free component", fontsize=10)
+        axes.set_title("all that the object can reach", fontsize=LABEL)
     elif len(report.path):
         steps = report.path - arrangement.pose
         axes.plot(*MILLIMETRES * steps[:, :2].T, np.degrees(steps[:, 2]), color=PATH, lw=1.4)
-        axes.set_title("way out", fontsize=10)
+        axes.set_title("way out", fontsize=LABEL)
     axes.computed_zorder = False  # the start lies inside
     axes.scatter(0, 0, 0, color=FINGER, s=30, depthshade=False, zorder=10)
     for axis, label in ((axes.xaxis, "Δx [mm]"), (axes.yaxis, "Δy [mm]"), (axes.zaxis, "Δθ [deg]")):
-        axis.set_label_text(label, fontsize=9)
+        axis.set_label_text(label, fontsize=LABEL)
         axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
-    axes.tick_params(labelsize=7, pad=0)
+    axes.tick_params(labelsize=NUMBER, pad=0)
     axes.locator_params(nbins=5)
     axes.view_init(elev=22, azim=-58)
     axes.set_box_aspect((1, 1, 1), zoom=0.88)

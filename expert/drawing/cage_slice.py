@@ -4,13 +4,23 @@ import numpy as np
 import shapely
 from matplotlib.axes import Axes
 
-from expert.drawing.cage_workspace import finger_colour
-from expert.drawing.canvas import EDGE, WALL, framed_axes, scale_bar
+from expert.drawing.canvas import framed_axes
+from expert.drawing.marks import (
+    EDGE,
+    ELSEWHERE,
+    FREE,
+    HALO,
+    LABEL,
+    NUMBER,
+    WALL,
+    finger_colour,
+    scale_bar,
+)
 from expert.geometry.pose import Array
 from expert.problems.cage import Arrangement
 from expert.world.slices import free_components, obstacles_at
 
-FREE, ELSEWHERE, START, LOOP = "#2b7fd0", "#d3e6f7", "#111111", "#111111"
+START, LOOP = "#111111", "#111111"
 SMALL = 0.1
 """A free component below this share of the picture is shown once more, enlarged."""
 HALVINGS, MIDDLE = 12, 0.7
@@ -25,7 +35,7 @@ def draw_slice(axes: Axes, arrangement: Arrangement) -> None:
     angle = float(arrangement.pose[2])
     obstacles = obstacles_at(arrangement.shape, arrangement.fingers, arrangement.wall_ends, angle)
     free = free_components(arrangement.shape, arrangement.fingers, arrangement.wall_ends, angle)
-    _draw_obstacles(axes, arrangement, obstacles)
+    _draw_obstacles(axes, arrangement, obstacles, numbered=True)
     _draw_free(axes, arrangement, free)
     start = shapely.Point(arrangement.pose[:2]).buffer(1e-3 * arrangement.shape.size)
     around = [p for p in free if p.intersects(start)]
@@ -35,7 +45,7 @@ def draw_slice(axes: Axes, arrangement: Arrangement) -> None:
     corners = shapely.get_coordinates(obstacles)
     framed_axes(axes, corners, 0.04)
     scale_bar(axes)
-    axes.set_title(f"slice at θ = {np.degrees(angle):.0f}°", fontsize=10)
+    axes.set_title(f"configuration space at θ = {np.degrees(angle):.0f}°", fontsize=LABEL)
     if around:
         reach = np.abs(shapely.get_coordinates(around) - arrangement.pose[:2]).max()
         if reach < SMALL * np.ptp(corners, axis=0).max():
@@ -53,13 +63,18 @@ def enclosing_loop(component: shapely.Polygon, obstacles: list[shapely.Polygon])
     return np.array(component.buffer(MIDDLE * low).exterior.coords)
 
 
-def _draw_obstacles(axes: Axes, arrangement: Arrangement, obstacles: list[shapely.Polygon]) -> None:
+def _draw_obstacles(
+    axes: Axes, arrangement: Arrangement, obstacles: list[shapely.Polygon], *, numbered: bool
+) -> None:
     for k, obstacle in enumerate(obstacles):
         colour = finger_colour(k) if k < len(arrangement.fingers) else WALL
         edge = colour if k < len(arrangement.fingers) else EDGE
         ring = np.array(obstacle.exterior.coords).T
         axes.fill(*ring, color=colour, alpha=0.28, lw=0, zorder=1)
         axes.plot(*ring, color=edge, lw=0.9, alpha=0.9, zorder=2)
+        if numbered and k < len(arrangement.fingers):
+            x, y = obstacle.representative_point().coords[0]
+            axes.text(x, y, f"{k}", ha="center", color=colour, fontsize=NUMBER, path_effects=HALO, zorder=8)
 
 
 def _draw_free(axes: Axes, arrangement: Arrangement, free: list[shapely.Polygon]) -> None:
@@ -89,7 +104,7 @@ def _enlarge(
 
     corner = min([(0.62, 0.62), (0.02, 0.62), (0.62, 0.02)], key=hidden)
     window = axes.inset_axes((*corner, 0.36, 0.36), zorder=7)
-    _draw_obstacles(window, arrangement, obstacles)
+    _draw_obstacles(window, arrangement, obstacles, numbered=False)
     _draw_free(window, arrangement, free)
     start = arrangement.pose[:2]
     framed_axes(window, np.stack([start - reach, start + reach]), 0.0)

@@ -1,4 +1,4 @@
-"""What all pictures share: colours, panels, and figures or frames written to a file by its suffix."""
+"""Panels, and figures or frames written to a file by its suffix."""
 
 import importlib
 import importlib.util
@@ -16,19 +16,16 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
+from scipy.spatial import cKDTree
 
 from expert.errors import InvalidProblem
 from expert.files.output import write_atomically
-from expert.geometry.pose import Array, perpendicular
-from expert.world.walls import HalfPlane
+from expert.geometry.pose import Array
 
 Image8 = NDArray[np.uint8]
 
 STILL = (".png", ".svg", ".pdf")
 MOVING = (".gif", ".mp4")
-OBJECT, EDGE, WALL = "#d9d2c5", "#4a4338", "#b8bcc2"
-FINGER, FINGER_FORCE, REACTION = "#c8102e", "#1a8a3c", "#1f5fbf"
-"""Red fingers, green finger forces, blue reactions, as in the thesis's Fig. 3-6."""
 
 
 def suffix(path: str | os.PathLike[str]) -> str:
@@ -55,15 +52,16 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def save_figure(figure: Figure, path: str | os.PathLike[str], *, colours: int | None = None) -> None:
-    """Write a still picture atomically; a .png with a palette of at most `colours` <= 256, which makes it smaller."""
+def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write a still picture atomically; a .png with a palette, which makes it a fraction of its size."""
     buffer = io.BytesIO()
     ending = suffix(path)
     # No date in the file: the same plan gives the same bytes.
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(ending)
     figure.savefig(buffer, format=ending[1:], metadata=metadata)
-    if colours and ending == ".png":
-        picture = Image.open(buffer).convert("RGB").quantize(colours, dither=Image.Dither.NONE)
+    if ending == ".png":
+        image = np.asarray(Image.open(buffer).convert("RGB"))
+        picture = _indexed(image, _palette(image, 256))
         buffer = io.BytesIO()
         picture.save(buffer, "png", optimize=True)
     write_atomically(path, buffer.getvalue())
@@ -85,11 +83,36 @@ def save_frames(frames: Iterable[Image8], path: str | os.PathLike[str], *, rate:
         write_atomically(path, _mp4([_even(frame) for frame in frames], rate))
 
 
+def _palette(pixels: Image8, size: int) -> Image8:
+    """Colours (size, 3): three quarters of them the commonest, which stay exact; the rest covers the others."""
+    codes, counts = np.unique(_codes(pixels), return_counts=True)
+    common = _colours(codes[np.argsort(-counts, kind="stable")[: size - size // 4]])
+    others = Image.fromarray(pixels).quantize(size // 4, Image.Quantize.MAXCOVERAGE).getpalette() or []
+    return np.concatenate([common, np.array(others, dtype=np.uint8).reshape(-1, 3)])[:size]
+
+
+def _indexed(pixels: Image8, palette: Image8) -> Image.Image:
+    """The image with each colour replaced by the nearest of the palette."""
+    codes, place = np.unique(_codes(pixels), return_inverse=True)
+    nearest = cKDTree(palette.astype(float)).query(_colours(codes).astype(float))[1].astype(np.uint8)
+    image = Image.fromarray(nearest[place].reshape(pixels.shape[:2]))
+    image.putpalette(palette.ravel().tolist())
+    return image
+
+
+def _codes(pixels: Image8) -> NDArray[np.int64]:
+    """One number for each pixel's colour."""
+    return pixels.reshape(-1, 3).astype(np.int64) @ np.array([1 << 16, 1 << 8, 1])
+
+
+def _colours(codes: NDArray[np.int64]) -> Image8:
+    return np.stack([codes >> 16, codes >> 8 & 255, codes & 255], axis=-1).astype(np.uint8)
+
+
 def _gif(frames: Sequence[Image8], rate: float) -> bytes:
-    """One palette for all frames, and no dithering, keep flat colours flat and files small."""
-    images = [Image.fromarray(frame) for frame in frames]
-    palette = Image.fromarray(np.concatenate([frames[0], frames[len(frames) // 2]])).quantize(64)
-    images = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    """One palette for all frames keeps flat colours flat and files small."""
+    palette = _palette(np.concatenate([frames[0], frames[len(frames) // 2]]), 64)
+    images = [_indexed(frame, palette) for frame in frames]
     buffer = io.BytesIO()
     images[0].save(
         buffer,
@@ -145,6 +168,11 @@ def plain_axes(axes: Axes, low: Array, high: Array) -> None:
         spine.set_color("#cccccc")
 
 
+def room_below(low: Array, high: Array) -> tuple[Array, Array]:
+    """The box with room for scales below what it shows."""
+    return low - [0.0, 0.13 * float((high - low)[0])], high
+
+
 def square_axes(axes: Axes) -> None:
     """Make a panel's view a square about its middle, so that all panels are of one size."""
     low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
@@ -157,45 +185,3 @@ def framed_axes(axes: Axes, points: Array, margin: float = 0.06) -> None:
     low, high = points.min(axis=0), points.max(axis=0)
     pad = margin * float((high - low).max())
     plain_axes(axes, low - pad, high + pad)
-
-
-def closed(points: Array) -> Array:
-    """Corners (k, 2) of a polygon with the first one repeated."""
-    return np.concatenate([points, points[:1]])
-
-
-def scale_bar(axes: Axes) -> None:
-    """A bar of 1, 2 or 5 times a power of ten, about a quarter of the picture wide, with its length in mm below the picture."""
-    (left, right), bottom = axes.get_xlim(), axes.get_ylim()[0]
-    width = right - left
-    lengths = np.outer([1, 2, 5], 10.0 ** np.arange(-7, 3)).ravel()
-    length = float(lengths[lengths <= 0.3 * width].max())
-    y = bottom + 0.035 * width
-    ends = (left + 0.04 * width, left + 0.04 * width + length)
-    axes.plot(ends, (y, y), color=EDGE, lw=2.5, solid_capstyle="butt", zorder=8)
-    axes.text(
-        sum(ends) / 2, y + 0.02 * width, f"{1e3 * length:g} mm", ha="center", fontsize=7, color=EDGE, zorder=8
-    )
-
-
-def draw_wall(axes: Axes, wall: HalfPlane, reach: float) -> None:
-    """The solid side of a half-plane, out to `reach` [m], with its surface as a line."""
-    along = reach * perpendicular(wall.normal)
-    foot = wall.point
-    ends = np.stack([foot - along, foot + along])
-    axes.fill(*np.concatenate([ends, ends[::-1] - reach * wall.normal]).T, color=WALL, lw=0, zorder=0)
-    axes.plot(*ends.T, color=EDGE, lw=1, zorder=1)
-
-
-def draw_arrow(axes: Axes, tail: Array, arrow: Array, color: str) -> None:
-    """An arrow of constant width from `tail` along `arrow` [m]; a very short one is left out."""
-    if np.linalg.norm(arrow) > 1e-6 * abs(np.diff(axes.get_xlim())[0]):
-        style = {
-            "arrowstyle": "-|>",
-            "color": color,
-            "lw": 1.5,
-            "shrinkA": 0,
-            "shrinkB": 0,
-            "mutation_scale": 8,
-        }
-        axes.annotate("", xy=tuple(tail + arrow), xytext=tuple(tail), arrowprops=style, zorder=5)

@@ -10,27 +10,38 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from expert.drawing.canvas import (
-    EDGE,
-    FINGER,
     MOVING,
-    OBJECT,
     Image8,
     new_figure,
     pixels,
     plain_axes,
+    room_below,
     save_figure,
     save_frames,
     suffix,
 )
+from expert.drawing.marks import (
+    CAPTION,
+    EDGE,
+    FINGER,
+    GOAL,
+    LABEL,
+    NUMBER,
+    OBJECT,
+    PATH,
+    START,
+    closed,
+    draw_fingers,
+    legend,
+    scale_bar,
+)
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, to_world
 from expert.grasping.executions import executions
-from expert.grasping.sweeping import Sweep
+from expert.grasping.sweeping import NEAR, TURNED, Sweep
 from expert.problems.grasp import GraspProblem, GraspSolution, arrangement_at
 from expert.world.slices import free_components, obstacles_at
 
-START, GOAL, PATH = "#8d8678", "#7a3db8", "#1f5fbf"
-"""Grey starts, purple goal, blue finger paths, as in the thesis's Fig. 5-28."""
 RUNS, SHOWN = 60, 12
 RATE, FRAMES, HOLD = 12.0, 32, 10
 """Of an animation: frames per second, and how many move and then stand."""
@@ -53,25 +64,38 @@ def draw(task: GraspProblem, answer: GraspSolution | None, path: str | os.PathLi
 def grasp_figure(task: GraspProblem, answer: GraspSolution, runs: Sweep) -> Figure:
     """Above: workspace, nested slices of the goal's cage, orientations over the path.  Below: all runs at each knot."""
     knots = len(answer.path)
-    figure = new_figure(max(9.0, 2.1 * knots), 6.2)
-    above, below = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.35, 1))[:, 0]
-    workspace, slices, turning = above.subplots(1, 3)
-    draw_starts(workspace, task, answer, runs)
-    _draw_slices(slices, task, answer)
-    _draw_turning(turning, task, runs)
-    for k, axes in enumerate(below.subplots(1, knots)):
+    figure = new_figure(max(9.0, 2.1 * knots), 6.8)
+    grid = figure.add_gridspec(2, 1, height_ratios=(1.35, 1))
+    above, below = grid[0].subgridspec(1, 3), grid[1].subgridspec(1, knots)
+    draw_starts(figure.add_subplot(above[0]), task, answer, runs)
+    _draw_slices(figure.add_subplot(above[1]), task, answer)
+    _draw_turning(figure.add_subplot(above[2]), task, runs)
+    for k in range(knots):
+        axes = figure.add_subplot(below[k])
         draw_moment(axes, task, answer, runs, float(k))
-        axes.set_title(f"knot {k}", fontsize=8)
-    figure.suptitle(_summary(task, runs), fontsize=9)
+        axes.set_title(f"knot {k}", fontsize=LABEL)
+    figure.suptitle(f"{answer.status.replace('_', ' ')}: {outcome(task, runs)}", fontsize=CAPTION)
+    fingers = ("finger at the start", "finger at the end", "finger path")
+    legend(figure, "starts", "goal", *fingers, "free at each knot", "limits of the cages", "executions")
     return figure
 
 
-def _summary(task: GraspProblem, runs: Sweep) -> str:
+def outcome(task: GraspProblem, runs: Sweep) -> str:
+    """How many runs arrived, and how far the others ended from the goal, in a reader's words."""
+    arrived, count = int(runs.arrived(task.pose, task.shape.size).sum()), len(runs.poses)
+    if arrived == count:
+        distance, angle = NEAR * task.shape.size, np.degrees(TURNED)
+        return f"all {count} random starts end at the goal, within {_length(distance)} and {angle:.2g}°"
     off, turned = runs.misses(task.pose)
     jammed = int(np.isfinite(runs.stalled).sum())
     jams = f", {jammed} jam on the way" if jammed else ""
-    size, angle = off.max() / task.shape.size, np.degrees(turned.max())
-    return f"{len(off)} random starts end within {size:.1e} of the size and {angle:.1e} deg of the goal{jams}"
+    miss = f"up to {_length(off.max())} and {np.degrees(turned.max()):.2g}° away"
+    return f"{arrived} of {count} random starts end at the goal, the others {miss}{jams}"
+
+
+def _length(metres: float) -> str:
+    """A length in millimetres, or in micrometres where it is small."""
+    return f"{1e3 * metres:.2g} mm" if metres >= 1e-4 else f"{1e6 * metres:.2g} µm"
 
 
 def draw_starts(axes: Axes, task: GraspProblem, answer: GraspSolution, runs: Sweep) -> None:
@@ -81,10 +105,11 @@ def draw_starts(axes: Axes, task: GraspProblem, answer: GraspSolution, runs: Swe
     axes.fill(*_outline(task, task.pose).T, color=(*to_rgb(GOAL), 0.15), ec=GOAL, lw=1.3, zorder=2)
     for finger in np.swapaxes(answer.path, 0, 1):
         axes.plot(*finger.T, "-", color=PATH, lw=1, zorder=3)
-        axes.plot(*finger[0], "o", mfc="white", mec=FINGER, ms=5, zorder=4)
         axes.plot(*finger[-1], "o", color=FINGER, ms=4, zorder=4)
+    draw_fingers(axes, answer.path[0], around=task.pose[:2], hollow=[True] * task.count)
     plain_axes(axes, *_view(task, answer, runs))
-    axes.set_title("starts, goal and finger paths", fontsize=8)
+    scale_bar(axes)
+    axes.set_title("starts, goal and finger paths", fontsize=LABEL)
 
 
 def _draw_slices(axes: Axes, task: GraspProblem, answer: GraspSolution) -> None:
@@ -103,7 +128,8 @@ def _draw_slices(axes: Axes, task: GraspProblem, answer: GraspSolution) -> None:
     axes.plot(*task.pose[:2], "+", color=GOAL, ms=7)
     pad = max(1.4 * reach, 0.02 * task.shape.size)
     plain_axes(axes, task.pose[:2] - pad, task.pose[:2] + pad)
-    axes.set_title(f"free positions at the goal's orientation\n({2e3 * pad:.0f} mm wide)", fontsize=8)
+    scale_bar(axes)
+    axes.set_title("free positions at the goal's orientation", fontsize=LABEL)
 
 
 def _draw_turning(axes: Axes, task: GraspProblem, runs: Sweep) -> None:
@@ -113,10 +139,10 @@ def _draw_turning(axes: Axes, task: GraspProblem, runs: Sweep) -> None:
     axes.fill_between(knots, -limits, limits, color=(*to_rgb(PATH), 0.15), lw=0)
     axes.plot(runs.s, turned.T, color=START, lw=0.5, alpha=0.7)
     axes.set_xticks(knots)
-    axes.set_xlabel("knot", fontsize=8)
-    axes.set_ylabel("orientation [deg]", fontsize=8)
-    axes.tick_params(labelsize=7)
-    axes.set_title("orientations and the cages' limits", fontsize=8)
+    axes.set_xlabel("knot", fontsize=LABEL)
+    axes.set_ylabel("orientation [deg]", fontsize=LABEL)
+    axes.tick_params(labelsize=NUMBER)
+    axes.set_title("orientations and the cages' limits", fontsize=LABEL)
 
 
 def draw_moment(axes: Axes, task: GraspProblem, answer: GraspSolution, runs: Sweep, s: float) -> None:
@@ -126,17 +152,20 @@ def draw_moment(axes: Axes, task: GraspProblem, answer: GraspSolution, runs: Swe
         axes.fill(*_outline(task, pose).T, color=(*to_rgb(OBJECT), 0.25), lw=0)
         axes.plot(*_outline(task, pose).T, color=EDGE, lw=0.6, alpha=0.7)
     axes.plot(*_outline(task, task.pose).T, "--", color=GOAL, lw=0.8)
-    axes.plot(*answer.fingers(s).T, "o", color=FINGER, ms=4, zorder=4)
+    draw_fingers(axes, answer.fingers(s), around=task.pose[:2])
     plain_axes(axes, *_view(task, answer, runs))
+    scale_bar(axes)
 
 
 def _frames(task: GraspProblem, answer: GraspSolution, runs: Sweep) -> Iterator[Image8]:
-    figure = new_figure(2.8, 2.8)
+    figure = new_figure(3.6, 4.2)
     axes = figure.add_subplot()
+    legend(figure, "executions", "goal", "finger")
     image = None
     for s in runs.s[:: max(1, len(runs.s) // FRAMES)]:
         axes.clear()
         draw_moment(axes, task, answer, runs, float(s))
+        axes.set_title(f"knot {s:.1f} of {len(answer.path) - 1}", fontsize=LABEL)
         image = pixels(figure)
         yield image
     if image is not None:
@@ -144,8 +173,7 @@ def _frames(task: GraspProblem, answer: GraspSolution, runs: Sweep) -> Iterator[
 
 
 def _outline(task: GraspProblem, pose: Array) -> Array:
-    corners = to_world(pose, task.shape.vertices)
-    return np.concatenate([corners, corners[:1]])
+    return closed(to_world(pose, task.shape.vertices))
 
 
 def _view(task: GraspProblem, answer: GraspSolution, runs: Sweep) -> tuple[Array, Array]:
@@ -153,4 +181,4 @@ def _view(task: GraspProblem, answer: GraspSolution, runs: Sweep) -> tuple[Array
     corners = to_world(runs.poses[:SHOWN, 0], task.shape.vertices).reshape(-1, 2)
     points = np.concatenate([corners, answer.path.reshape(-1, 2), _outline(task, task.pose)])
     pad = 0.05 * task.shape.size
-    return points.min(axis=0) - pad, points.max(axis=0) + pad
+    return room_below(points.min(axis=0) - pad, points.max(axis=0) + pad)

@@ -6,14 +6,16 @@ import numpy as np
 import shapely
 from matplotlib.axes import Axes
 
-from expert.drawing.canvas import EDGE, FINGER, closed, plain_axes
-from expert.drawing.certified_grasp import GOAL, PATH, START
+from expert.drawing.canvas import plain_axes, room_below
+from expert.drawing.marks import EDGE, FINGER, GOAL, LABEL, PATH, START, closed, draw_fingers, scale_bar
 from expert.geometry.pose import Array, to_world
 from expert.problems.grasp import GraspProblem, GraspSolution, arrangement_at
 from expert.world.slices import free_components, obstacles_at
 
-LEAST_ERROR = 1e-17
-"""Zero on a logarithmic axis."""
+REACH = 0.75
+"""Half the width of a panel over the object's size."""
+LEAST_ERROR = 1e-10
+"""Smaller errors are rounding, and drawn as this."""
 
 
 def draw_start_set(axes: Axes, task: GraspProblem, answer: GraspSolution) -> None:
@@ -28,9 +30,8 @@ def draw_start_set(axes: Axes, task: GraspProblem, answer: GraspSolution) -> Non
             axes.fill(*np.array(part.exterior.coords).T, color=PATH, lw=0.8, zorder=3)
     for finger in np.swapaxes(answer.path, 0, 1):
         axes.plot(*finger.T, color=FINGER, lw=0.8)
-    axes.plot(*answer.path[0].T, "o", color=FINGER, ms=4)
-    reach = 0.75 * task.shape.size
-    plain_axes(axes, task.pose[:2] - reach, task.pose[:2] + reach)
+    draw_fingers(axes, answer.path[0], around=task.pose[:2], hollow=[True] * task.count)
+    _frame(axes, task)
 
 
 def draw_poses(axes: Axes, task: GraspProblem, poses: Array, fingers: Array, title: str) -> None:
@@ -38,10 +39,9 @@ def draw_poses(axes: Axes, task: GraspProblem, poses: Array, fingers: Array, tit
     for pose in poses:
         axes.plot(*closed(to_world(pose, task.shape.vertices)).T, color=START, lw=0.5, alpha=0.7)
     axes.plot(*closed(to_world(task.pose, task.shape.vertices)).T, color=GOAL, lw=1.3)
-    axes.plot(*fingers.T, "o", color=FINGER, ms=4)
-    reach = 0.72 * task.shape.size
-    plain_axes(axes, task.pose[:2] - reach, task.pose[:2] + reach)
-    axes.set_title(title, fontsize=8)
+    draw_fingers(axes, fingers, around=task.pose[:2])
+    _frame(axes, task)
+    axes.set_title(title, fontsize=LABEL)
 
 
 def draw_errors(axes: Axes, errors: Mapping[str, Array]) -> None:
@@ -49,5 +49,12 @@ def draw_errors(axes: Axes, errors: Mapping[str, Array]) -> None:
     axes.boxplot([np.maximum(e, LEAST_ERROR) for e in errors.values()], showfliers=True, widths=0.5)
     axes.set_xticks([1, 2], list(errors))
     axes.set_yscale("log")
-    axes.set_title("L1 error of the end pose over the object's size", fontsize=8)
-    axes.tick_params(labelsize=8)
+    axes.set_ylim(bottom=LEAST_ERROR / 3)
+    axes.set_title("error of the end pose over the object's size\n(at the bottom: rounding)", fontsize=LABEL)
+    axes.tick_params(labelsize=LABEL)
+
+
+def _frame(axes: Axes, task: GraspProblem) -> None:
+    reach = REACH * task.shape.size
+    plain_axes(axes, *room_below(task.pose[:2] - reach, task.pose[:2] + reach))
+    scale_bar(axes)

@@ -52,6 +52,9 @@ def test_a_solution_is_sound_and_its_certificate_says_so(solution: Path, tmp_pat
     assert certificate["verdict"] == "sound"
     assert len(certificate["checks"]) > 15
     assert all(check["ok"] for check in certificate["checks"])
+    unchecked = [line for line in done.stdout.splitlines() if line.startswith("claimed, not checked: ")]
+    assert unchecked == ["claimed, not checked: " + ", ".join(certificate["claimed"])]
+    assert "seconds" in certificate["claimed"]
 
 
 def test_a_solution_carries_its_whole_problem(solution: Path) -> None:
