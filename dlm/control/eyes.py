@@ -6,16 +6,21 @@ from typing import Protocol
 import numpy as np
 
 from dlm.control import pusht
-from dlm.control.look import Stage, find_agent, find_block, follow_block, frame_of, stage
+from dlm.control.look import Frame, Stage, find_agent, find_block, follow_block, frame_of, stage
 from dlm.control.picture import empty_scene
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
 from expert.pushing.drive import Drive
 from expert.pushing.goal import Goal
-from expert.pushing.impulses import ANGLE, Law, X, run
+from expert.pushing.impulse_model import ImpulseModel
+from expert.pushing.impulses import ANGLE, X, run
 
 LOST, LOST_BY = 2.5, 250.0
 """A fit whose squared error exceeds this multiple of the usual one by this much is doubted: look everywhere."""
+
+
+HIDDEN = 8
+"""Steps after which an agent that nobody saw is where it is told to be."""
 
 
 @dataclass
@@ -32,9 +37,10 @@ class Belief:
 
 
 class Eyes(Protocol):
-    """Turns observations into beliefs; `act` tells it the command that follows."""
+    """Turns observations into beliefs; `act` tells it the command that follows, `believe` what the block is like."""
 
-    def reset(self) -> None: ...
+    def reset(self, model: ImpulseModel) -> None: ...
+    def believe(self, model: ImpulseModel) -> None: ...
     def see(self, observation: object) -> Belief: ...
     def act(self, command: Array) -> None: ...
 
@@ -47,9 +53,12 @@ class StateEyes:
     belief: Belief | None = None
     command: Array | None = None
 
-    def reset(self) -> None:
+    def reset(self, model: ImpulseModel) -> None:
         """Forget the episode."""
         self.belief = self.command = None
+
+    def believe(self, model: ImpulseModel) -> None:
+        """What is read is believed, whatever the model."""
 
     def see(self, observation: object) -> Belief:
         """From (5,) or {"state": (5,)}.  Raises InvalidProblem."""
@@ -76,23 +85,27 @@ class PixelEyes:
     While the block rests, what is seen of it is averaged.
     """
 
-    law: Law
+    model: ImpulseModel
     goal: Goal
-    drive: Drive = field(default_factory=Drive)
     belief: Belief | None = None
     commands: list[Array] = field(default_factory=list)
     last: int = 0
     usual: float = 0.0
     seen: list[Array] = field(default_factory=list)
+    state: Array = field(default_factory=lambda: np.zeros(13))
 
     def __post_init__(self) -> None:
-        self.stage: Stage = stage(
-            self.law.edges, empty_scene(self.law.edges, self.goal.pose), self.drive.radius
-        )
+        edges = self.model.edges
+        self.stage: Stage = stage(edges, empty_scene(edges, self.goal.pose), self.model.radius)
 
-    def reset(self) -> None:
+    def reset(self, model: ImpulseModel) -> None:
         """Forget the episode."""
+        self.model = model
         self.belief, self.commands, self.seen, self.usual = None, [], [], 0.0
+
+    def believe(self, model: ImpulseModel) -> None:
+        """Predict with another model from now on."""
+        self.model = model
 
     def act(self, command: Array) -> None:
         """The command of this step."""
@@ -103,32 +116,33 @@ class PixelEyes:
         pixels = observation.get("pixels") if isinstance(observation, dict) else observation
         frame = frame_of(pixels)
         if self.belief is None or self.belief.position is None:
-            return self._look(pixels)
-        guess, position, velocity, moving = self._predicted(self.belief)
+            return self._look(frame)
+        moving = self._predict(self.belief.pose)
+        guess, position = self.model.frame_pose(self.state[X : ANGLE + 1]), self.state[:2].copy()
         pose, error = follow_block(self.stage, frame, guess, self.last, position)
         if error > LOST * self.usual + LOST_BY:
             pose, self.last, error = find_block(self.stage, frame, self.goal.centroid, position)
         self.usual = 0.8 * self.usual + 0.2 * error
         self.seen = [pose] if moving else [*self.seen, pose]
-        self.belief = Belief(np.mean(self.seen, axis=0), position, velocity, moving)
+        self.belief = Belief(np.mean(self.seen, axis=0), position, self.state[2:4].copy(), moving)
         return self.belief
 
-    def _look(self, pixels: object) -> Belief:
+    def _look(self, frame: Frame) -> Belief:
         """Everything from nothing; an agent that hides is where its commands have drawn it after a while."""
-        frame = frame_of(pixels)
         agent = find_agent(self.stage, frame)
-        if agent is None and len(self.commands) >= 8:
+        if agent is None and len(self.commands) >= HIDDEN:
             agent = self.commands[-1]
         pose, self.last, self.usual = find_block(self.stage, frame, self.goal.centroid, agent)
         self.seen = [pose]
+        self.state = np.zeros(13)
+        if agent is not None:
+            self.state[:2] = agent
         self.belief = Belief(pose, agent, np.zeros(2))
         return self.belief
 
-    def _predicted(self, before: Belief) -> tuple[Array, Array, Array, bool]:
-        """Block, agent and whether the block is touched, after the last command."""
-        state = np.zeros(13)
-        assert before.position is not None
-        state[:2], state[2:4], state[X : ANGLE + 1] = before.position, before.velocity, before.pose
-        run(self.law, state, self.commands[-1][None], self.drive.substeps)
-        pose = state[X : ANGLE + 1].copy()
-        return pose, state[:2].copy(), state[2:4].copy(), bool((pose != before.pose).any())
+    def _predict(self, pose: Array) -> bool:
+        """Carry the state through the last command, from the believed pose; whether the block moves."""
+        self.state[X : ANGLE + 1] = self.model.centre_pose(pose)
+        before = self.state[X : ANGLE + 1].copy()
+        run(self.model.law, self.state, self.commands[-1][None], self.model.drive.substeps)
+        return bool(np.abs(self.state[X : ANGLE + 1] - before).max() > 0)

@@ -6,13 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlm.control import pusht
-from dlm.control.eyes import Belief, Eyes, PixelEyes, StateEyes
+from dlm.control.eyes import HIDDEN, Belief, Eyes, PixelEyes, StateEyes
+from dlm.control.learner import Learner
 from expert.geometry.pose import Array
 from expert.pushing.planner import Planner
 from expert.world.values import require
 
-HIDDEN = 8
-"""Steps after which an agent that nobody saw is where it is told to be."""
 NEAR = 2.5
 """Plans that ended within this multiple of the tolerance, yet not at the goal, make it stricter."""
 
@@ -25,7 +24,7 @@ class PushPolicy:
     the goal to be missed, and becomes stricter.
     """
 
-    planner: Planner
+    learner: Learner
     eyes: Eyes
     tolerance: float
     belief: Belief | None = None
@@ -40,15 +39,22 @@ class PushPolicy:
         """For gym-pusht with observations of the type `pixels` or `state`.  Raises InvalidProblem."""
         require(observation in ("pixels", "state"), "observation", "pixels or state", observation)
         settings = pusht.PIXELS if observation == "pixels" else pusht.STATE
-        planner = pusht.pusht_planner(settings.speed)
+        planner = pusht.pusht_planner(settings.speed, settings.wobble)
+        learner = Learner(planner, settings.gate)
         eyes: Eyes = StateEyes()
         if observation == "pixels":
-            eyes = PixelEyes(planner.model.law, planner.goal)
-        return cls(planner, eyes, settings.tolerance)
+            eyes = PixelEyes(planner.model, planner.goal)
+        return cls(learner, eyes, settings.tolerance)
+
+    @property
+    def planner(self) -> Planner:
+        """With the model of the block as far as it is known."""
+        return self.learner.planner
 
     def reset(self) -> None:
         """Begin a new episode."""
-        self.eyes.reset()
+        self.learner.reset()
+        self.eyes.reset(self.planner.model)
         self.belief, self.arrived, self._queue = None, False, []
         self._strictness, self._weight, self._error = 1.0, 1.0, np.inf
 
@@ -56,14 +62,22 @@ class PushPolicy:
         """The command (2,) for this step: where the agent shall go.  Raises InvalidProblem for bad observations."""
         self.belief = belief = self.eyes.see(observation)
         if not self._queue:
-            self._queue = self._aside(belief) if belief.position is None else self._next_push(belief)
+            self._queue = self._aside(belief) if belief.position is None else self._learned(belief)
         self.arrived = not belief.moving and self._is_arrived(belief)
         command = np.clip(self._queue.pop(0), 0, pusht.SIDE).astype(np.float32)
         self.eyes.act(command.astype(float))
+        self.learner.note(belief, command.astype(float))
         return command
 
     def _is_arrived(self, belief: Belief) -> bool:
         return bool(self.planner.goal.error(belief.pose) < self.tolerance)
+
+    def _learned(self, belief: Belief) -> list[Array]:
+        """Learn from the last push; wait while the block slides on; then the next one."""
+        resting = self.learner.is_at_rest(belief)
+        if self.learner.learn(belief):
+            self.eyes.believe(self.planner.model)
+        return self._next_push(belief) if resting else [self.learner.commands[-1]]
 
     def _next_push(self, belief: Belief) -> list[Array]:
         """Commands up to the end of the next push."""

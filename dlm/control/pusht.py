@@ -9,7 +9,8 @@ import shapely
 from expert.geometry.pose import Array, to_world
 from expert.pushing.drive import Drive
 from expert.pushing.goal import Goal
-from expert.pushing.impulses import Block, ImpulseModel
+from expert.pushing.impulse_model import ImpulseModel
+from expert.pushing.impulses import Block
 from expert.pushing.planner import Planner, Workspace, box
 from expert.pushing.table import Grid, push_table
 from expert.world.shape import Shape
@@ -29,13 +30,16 @@ COVERAGE = 0.95
 
 
 class Settings(NamedTuple):
-    """Speed of pushes [pixels per step], and the error at which the T has arrived [pixels]."""
+    """Speed of pushes [per step], error at which the T has arrived, misfit of a push that is worth learning
+    from, and how well the agent's place beside the T is known [pixels]."""
 
     speed: float
     tolerance: float
+    gate: float
+    wobble: float
 
 
-STATE, PIXELS = Settings(60.0, 1.5), Settings(60.0, 1.2)
+STATE, PIXELS = Settings(120.0, 1.8, 0.5, 0.0), Settings(100.0, 1.4, 6.0, 1.0)
 
 
 @lru_cache
@@ -53,12 +57,12 @@ def about_centre(poses: Array) -> Array:
 
 
 @lru_cache
-def pusht_planner(speed: float) -> Planner:
+def pusht_planner(speed: float, wobble: float = 0.0) -> Planner:
     """Planner of the T in its world."""
-    model = ImpulseModel(block(), Drive(), speed)
+    model = ImpulseModel(block(), Drive(), speed, reference=CENTRE_OF_GRAVITY)
     goal = Goal(model.shape, model.origin, about_centre(GOAL))
     space = Workspace(walls=box(*WALLS), finger_walls=box(0, SIDE))
-    return Planner(push_table(model, Grid()), model, goal, space)
+    return Planner(push_table(model, Grid(wobble=wobble)), model, goal, space)
 
 
 def coverage(pose: Array) -> float:

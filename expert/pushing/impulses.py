@@ -7,17 +7,16 @@ beyond `slop`.  Several contacts share the work by projected Gauss-Seidel, as th
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from expert.geometry.pose import Array
-from expert.pushing.drive import Drive, gains
+from expert.pushing.drive import Drive
 from expert.pushing.outline import Outline, outline, touch
 from expert.world.shape import Shape
-from expert.world.values import IntArray, readonly, require
+from expert.world.values import readonly, require
 
 SWEEPS = 10
 """Of Gauss-Seidel per substep."""
@@ -93,9 +92,7 @@ def _resolve(law: Law, s: Array) -> None:
     rx, ry = s[FX] - s[X], s[FY] - s[Y]
     bx, by = c * rx + sn * ry, c * ry - sn * rx
     pieces = len(law.edges.first) - 1
-    rows = np.empty(
-        (pieces, 7)
-    )  # normal, lever, mass, speed wanted by the bias, impulse, impulse of the bias
+    rows = np.empty((pieces, 7))  # normal, lever, mass, speed of the bias, impulse, impulse of the bias
     count = 0
     for piece in range(pieces):
         t = touch(law.edges, piece, bx, by)
@@ -132,70 +129,3 @@ def run(law: Law, s: Array, commands: Array, substeps: int) -> None:
     for k in range(len(commands)):
         for _ in range(substeps):
             substep(law, s, commands[k, 0], commands[k, 1])
-
-
-@njit(cache=True, error_model="numpy")
-def _outcomes(
-    law: Law, starts: Array, moves: Array, steps: IntArray, weights: Array, substeps: int
-) -> tuple[Array, Array]:
-    shifts, fingers = np.empty((len(starts), 3)), np.empty((len(starts), 2))
-    for i in range(len(starts)):
-        s = np.zeros(13)
-        s[FX], s[FY] = starts[i]
-        for k in range(steps[i]):
-            w = weights[steps[i], k]
-            x, y = starts[i, 0] + w * moves[i, 0], starts[i, 1] + w * moves[i, 1]
-            for _ in range(substeps):
-                substep(law, s, x, y)
-        shifts[i] = s[X : X + 3]
-        c, sn = np.cos(s[ANGLE]), np.sin(s[ANGLE])
-        rx, ry = s[FX] - s[X], s[FY] - s[Y]
-        fingers[i] = c * rx + sn * ry, c * ry - sn * rx
-    return shifts, fingers
-
-
-@dataclass(frozen=True)
-class ImpulseModel:
-    """The block pushed by the driven disc: outcomes of straight pushes from rest to rest (see `expert.pushing.table`)."""
-
-    block: Block
-    drive: Drive
-    speed: float = 60.0
-
-    @cached_property
-    def law(self) -> Law:
-        """The numbers of the compiled model."""
-        return self.block.law(self.drive)
-
-    @property
-    def shape(self) -> Shape:
-        return self.block.shape
-
-    @property
-    def origin(self) -> Array:
-        """The moving frame's origin in the shape's frame: the centre of gravity."""
-        return self.block.centre
-
-    @property
-    def radius(self) -> float:
-        return self.drive.radius
-
-    def steps(self, lengths: Array) -> IntArray:
-        """Control steps of pushes of given lengths: one to start and stop, and one for each `speed` of way."""
-        return 1 + np.maximum(np.ceil(lengths / self.speed), 1).astype(np.int64)
-
-    def leads(self, lengths: Array) -> Array:
-        """How far the commands of such pushes reach beyond their starts (N,)."""
-        farthest = np.array(
-            [0, 0, *(gains(self.drive, n, ())[:, 2].max() for n in range(2, self.steps(lengths).max() + 1))]
-        )
-        return lengths * farthest[self.steps(lengths)]
-
-    def outcomes(self, starts: Array, directions: Array, lengths: Array) -> tuple[Array, Array]:
-        """Pose changes (N, 3) of the block, and where the finger ends in its new frame (N, 2)."""
-        steps = self.steps(lengths)
-        weights = np.zeros((steps.max() + 1, steps.max()))
-        for n in np.unique(steps):
-            weights[n, :n] = gains(self.drive, int(n), ())[:, 2]
-        moves = np.ascontiguousarray(lengths[:, None] * directions)
-        return _outcomes(self.law, np.ascontiguousarray(starts), moves, steps, weights, self.drive.substeps)

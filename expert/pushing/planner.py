@@ -7,13 +7,12 @@ import numpy as np
 
 from expert.geometry.pose import Array, rotation, to_world
 from expert.pushing.approach import Travel
-from expert.pushing.drive import gains
 from expert.pushing.goal import Goal
-from expert.pushing.impulses import ImpulseModel
+from expert.pushing.impulse_model import ImpulseModel
 from expert.pushing.outline import clearance
 from expert.pushing.refine import composed, refine
-from expert.pushing.search import Moves, Nodes, Prices, Task, beam_search, poses_of
-from expert.pushing.table import Table, straight
+from expert.pushing.search import Moves, Nodes, Prices, Task, beam_search, inside, poses_of
+from expert.pushing.table import Table, steadiness, straight
 
 TOUCHING = 0.85
 """A finger whose centre is nearer than this fraction of its radius is inside the object, not beside it."""
@@ -107,7 +106,7 @@ class Planner:
         """The finger's ways."""
         model = self.model
         return Travel(
-            model.drive, model.law.edges, self.table.ways, self.effort.clearance, self.workspace.finger_walls
+            model.drive, model.edges, self.table.ways, self.effort.clearance, self.workspace.finger_walls
         )
 
     def plan(
@@ -120,7 +119,7 @@ class Planner:
         """
         prices = self.prices._replace(miss=weight * self.prices.miss, error=weight * self.prices.error)
         finger = rotation(pose[2]).T @ (position - pose[:2])
-        if clearance(self.model.law.edges, *finger) < TOUCHING * self.model.radius:
+        if clearance(self.model.edges, *finger) < TOUCHING * self.model.radius:
             return self._escape(pose, position, velocity)
         for depth, width in ((self.effort.depth, self.effort.width), (1, len(self.table.stations))):
             nodes, ends = beam_search(
@@ -136,7 +135,7 @@ class Planner:
 
     def _escape(self, pose: Array, position: Array, velocity: Array) -> Plan | None:
         """Straight off the object, for a finger in it or at it."""
-        out = self.travel.retreat(pose, position, self.table.gap)
+        out = self.travel.retreat(pose, position, self.table.grid.gap)
         if out is None:
             return None
         commands = self.model.drive.commands(3, position, velocity, out, {})
@@ -148,9 +147,13 @@ class Planner:
         if not len(ends):
             return []
         before = np.where(ends["parent"][:, None] < 0, pose, poses_of(nodes)[ends["parent"]])
+        table, grid = self.table, self.table.grid
         parameters, _, _, errors = refine(
-            self.table, self.goal, before, self.table.parameters[ends["entry"]], self.effort.rounds
+            table, self.goal, before, table.parameters[ends["entry"]], self.effort.rounds
         )
+        shifts, _ = table.outcomes(parameters)
+        unsteady = steadiness(self.model, table.curve, parameters, shifts, grid.wobble)
+        errors = np.where(unsteady <= grid.spread * grid.wobble, errors, np.inf)
         steps = self.model.steps(parameters[:, 2]) - self.table.steps[ends["entry"]]
         found = []
         for k in np.argsort(ends["time"] + steps + errors / tolerance):
@@ -208,9 +211,9 @@ class Planner:
         if way is None:
             return None
         steps = int(self.model.steps(lengths)[0])
-        push = start + gains(self.model.drive, steps, ())[:, 2:] * (
-            lengths[0] * rotation(pose[2]) @ directions[0]
-        )
+        push = start + self.model.weights(steps)[:, None] * (lengths[0] * rotation(pose[2]) @ directions[0])
+        if not all(inside(self.workspace.finger_walls, x, y, 1e-9) for x, y in push):
+            return None
         expected = composed(pose[None], self.table.outcomes(candidate.first[None])[0])[0]
         guessed = prices.travel + float(np.linalg.norm(start - position)) / prices.pace
         return Plan(

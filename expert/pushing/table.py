@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from expert.geometry.pose import Array
+from expert.geometry.pose import Array, perpendicular
 from expert.pushing.contour import Contour, contour, turned
 from expert.pushing.roads import Roads, roads
 from expert.world.shape import Shape
@@ -34,13 +34,19 @@ class PushModel(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Grid:
-    """Which pushes a table holds: stations on the stand-off curve, angles to its normal [rad], lengths; gap of the curve."""
+    """Which pushes a table holds: stations on the stand-off curve, angles to its normal [rad], lengths; gap of the curve.
+
+    least: pushes that move the object less are left out.  wobble: how well the finger's place beside the object is known;
+    pushes whose ends differ by more than `spread` wobbles where they start a wobble aside are left out, too.
+    """
 
     stations: int = 60
     angles: tuple[float, ...] = tuple(np.deg2rad([-45, -30, -15, 0, 15, 30, 45]))
     lengths: tuple[float, ...] = (16, 22, 28, 36, 44, 54, 66, 80, 96, 112, 130, 150, 170, 190)
     gap: float = 6.0
     least: float = 1.0
+    wobble: float = 0.0
+    spread: float = 6.0
 
     def __post_init__(self) -> None:
         require(self.stations >= 3, "grid.stations", "at least 3", self.stations)
@@ -52,29 +58,24 @@ class Grid:
 class Table:
     """Pushes K, sorted by station: parameters (K, 3) = (arc length, angle, length), pose changes (K, 3), fingers (K, 2), steps (K,).
 
-    Pushes of station s are those from first[s] to first[s + 1].
+    Pushes of station s are those from first[s] to first[s + 1]; ways: the finger's, round the object to the stations.
     """
 
     model: PushModel
     curve: Contour
-    gap: float
+    grid: Grid
     parameters: Array
     shifts: Array
     fingers: Array
     steps: IntArray
     first: IntArray
+    ways: Roads
 
     @cached_property
     def stations(self) -> Array:
         """Arc lengths (S,) of the stations."""
         count = len(self.first) - 1
         return np.arange(count) * self.curve.length / count
-
-    @cached_property
-    def ways(self) -> Roads:
-        """The finger's ways round the object to the stations."""
-        points, _ = self.curve.at(self.stations)
-        return roads(self.model.shape, self.model.origin, self.model.radius, self.gap, points)
 
     def outcomes(self, parameters: Array) -> tuple[Array, Array]:
         """Pose changes (N, 3) and fingers (N, 2) of any pushes (N, 3), in the table or between its entries."""
@@ -87,25 +88,47 @@ def straight(curve: Contour, parameters: Array) -> tuple[Array, Array, Array]:
     return starts, turned(normals, parameters[:, 1]), parameters[:, 2]
 
 
-def push_table(model: PushModel, grid: Grid) -> Table:
-    """Roll out all pushes of a grid; those that move the object by less than grid.least are left out."""
+def span(model: PushModel, a: Array, b: Array) -> Array:
+    """How far pose changes (N, 3) are apart (N,): position, and angle at half the object's size."""
+    difference = a - b
+    return np.hypot(np.hypot(difference[:, 0], difference[:, 1]), model.shape.size / 2 * difference[:, 2])
+
+
+def steadiness(model: PushModel, curve: Contour, parameters: Array, shifts: Array, wobble: float) -> Array:
+    """How far pushes (N, 3) end at most from their `shifts` (N, 3) where they start a wobble to either side (N,)."""
+    if wobble == 0:
+        return np.zeros(len(parameters))
+    starts, directions, lengths = straight(curve, parameters)
+    aside = wobble * perpendicular(directions)
+    ends = (model.outcomes(starts + side, directions, lengths)[0] for side in (aside, -aside))
+    return np.max([span(model, end, shifts) for end in ends], axis=0)
+
+
+def push_table(model: PushModel, grid: Grid, ways: Roads | None = None) -> Table:
+    """Roll out all pushes of a grid; those that move the object by less than grid.least are left out.
+
+    ways: of a table of the same outline and grid, if there is one.
+    """
     curve = contour(model.shape, model.origin, model.radius + grid.gap)
     stations = np.arange(grid.stations) * curve.length / grid.stations
     axes = np.meshgrid(stations, grid.angles, grid.lengths, indexing="ij")
     parameters = np.stack([axis.ravel() for axis in axes], -1)
     shifts, fingers = model.outcomes(*straight(curve, parameters))
-    size = model.shape.size / 2
-    moved = np.hypot(np.hypot(shifts[:, 0], shifts[:, 1]), size * shifts[:, 2]) >= grid.least
+    moved = span(model, shifts, 0 * shifts) >= grid.least
+    moved &= steadiness(model, curve, parameters, shifts, grid.wobble) <= grid.spread * grid.wobble
     station = np.repeat(np.arange(grid.stations), len(grid.angles) * len(grid.lengths))[moved]
     first = np.searchsorted(station, np.arange(grid.stations + 1))
     parameters = parameters[moved]
+    if ways is None:
+        ways = roads(model.shape, model.origin, model.radius, grid.gap, curve.at(stations)[0])
     return Table(
         model,
         curve,
-        grid.gap,
+        grid,
         parameters,
         shifts[moved],
         fingers[moved],
         model.steps(parameters[:, 2]),
         first,
+        ways,
     )

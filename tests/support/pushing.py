@@ -3,7 +3,8 @@
 import numpy as np
 
 from expert.pushing.drive import Drive
-from expert.pushing.impulses import Block, ImpulseModel
+from expert.pushing.impulse_model import ImpulseModel
+from expert.pushing.impulses import Block
 from expert.world.shape import Shape
 
 TEE = Shape.of_pieces(

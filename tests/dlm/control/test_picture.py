@@ -16,7 +16,7 @@ EPISODES = 60
 @pytest.fixture(scope="module")
 def scene():
     planner = pusht.pusht_planner(60.0)
-    edges = planner.model.law.edges
+    edges = planner.model.edges
     return stage(edges, empty_scene(edges, planner.goal.pose), 15.0), planner.goal.centroid
 
 
