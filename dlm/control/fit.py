@@ -10,7 +10,7 @@ from expert.pushing.outline import Outline
 NUDGE = np.array([0.5, 0.5, 0.008])
 """Differences, in pixels of the surface and rad."""
 STEP = np.array([12.0, 12.0, 0.3])
-DONE = 0.01
+DONE = 0.03
 """A fit ends when it moves by less than this fraction of the nudges."""
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dlm.control.fit import fit_disc, fit_pose
-from dlm.control.picture import COLOURS, Pixels, places
+from dlm.control.picture import COLOURS, SCALE, SIZE, Pixels, places
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array, rotation
 from expert.pushing.outline import Outline
@@ -25,10 +25,9 @@ FREE = np.zeros(3)
 
 
 class Frame(NamedTuple):
-    """A frame for fitting: colours (96, 96, 3) in the light of the colour table, and the same smoothed."""
+    """A frame for fitting: colours (96, 96, 3) in the light of the colour table."""
 
     colours: Array
-    smooth: Array
 
 
 class Stage(NamedTuple):
@@ -60,16 +59,19 @@ def frame_of(pixels: object) -> Frame:
         raise InvalidProblem(
             "pixels", expected="a picture of Push-T on white ground", got=f"median {light:g}"
         )
-    colours = image * (255.0 / light)
-    return Frame(colours, np.asarray(cv2.blur(colours, (3, 3)), dtype=float))
+    return Frame(image * (255.0 / light))
 
 
 def near(at: Stage, frame: Frame, centre: Array, reach: float, agent: Array | None) -> Pixels:
     """Samples within reach of a centre (2,), without those that the agent may hide."""
-    kept = ((at.places - centre) ** 2).sum(-1) < reach**2
+    low = np.clip(np.floor((centre - reach) / SCALE), 0, SIZE).astype(int)
+    high = np.clip(np.ceil((centre + reach) / SCALE) + 1, 0, SIZE).astype(int)
+    part = np.s_[low[1] : high[1], low[0] : high[0]]
+    spots = at.places[part]
+    kept = ((spots - centre) ** 2).sum(-1) < reach**2
     if agent is not None:
-        kept &= ((at.places - agent) ** 2).sum(-1) > (at.radius + 5) ** 2
-    return Pixels(at.places[kept], frame.colours[kept], at.empty[kept])
+        kept &= ((spots - agent) ** 2).sum(-1) > (at.radius + 5) ** 2
+    return Pixels(spots[kept], frame.colours[part][kept], at.empty[part][kept])
 
 
 def find_agent(at: Stage, frame: Frame) -> Array | None:
@@ -88,7 +90,8 @@ def find_agent(at: Stage, frame: Frame) -> Array | None:
 
 def _block_samples(at: Stage, frame: Frame, agent: Array | None) -> NDArray[np.bool_]:
     """Mask (96, 96): the largest patch in the block's colours; rims of other things have them too."""
-    nearest = ((frame.smooth[..., None, :] - COLOURS) ** 2).sum(-1).argmin(-1)
+    smooth = cv2.blur(frame.colours, (3, 3))
+    nearest = ((smooth[..., None, :] - COLOURS) ** 2).sum(-1).argmin(-1)
     kept = (nearest == 3) | (nearest == 4)
     hidden = np.zeros_like(kept)
     if agent is not None:

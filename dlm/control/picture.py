@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from expert.geometry.pose import Array
-from expert.pushing.outline import Outline, clearance, touch
+from expert.pushing.outline import Outline, clearance, distance_up_to
 
 SURFACE, SIZE = 512, 96
 SCALE = SURFACE / SIZE
@@ -67,7 +67,7 @@ def paint(edges: Outline, last: int, pose: Array, pixels: Pixels, width: float, 
         for d in range(3):
             out[i, d] = pixels.empty[i, d]
         for k in range(pieces):
-            gap = touch(edges, (last + 1 + k) % pieces, x, y).distance
+            gap = distance_up_to(edges, (last + 1 + k) % pieces, x, y, HALF_LINE + width)
             if gap < HALF_LINE + width:
                 line, fill = _ramp(HALF_LINE - gap, width), _ramp(-HALF_LINE - gap, width)
                 for d in range(3):

@@ -79,6 +79,18 @@ def _outside(edges: Outline, piece: int, x: float, y: float) -> Touch:
 
 
 @njit(cache=True, error_model="numpy")
+def distance_up_to(edges: Outline, piece: int, x: float, y: float, limit: float) -> float:
+    """Signed distance from one convex piece to the point (x, y) of the body frame, or `limit` where it is at least that."""
+    deepest = -np.inf
+    for e in range(edges.first[piece], edges.first[piece + 1]):
+        gap = (x - edges.starts[e, 0]) * edges.normals[e, 0] + (y - edges.starts[e, 1]) * edges.normals[e, 1]
+        deepest = max(deepest, gap)
+    if deepest <= 0 or deepest >= limit:
+        return min(deepest, limit)
+    return min(_outside(edges, piece, x, y).distance, limit)
+
+
+@njit(cache=True, error_model="numpy")
 def clearance(edges: Outline, x: float, y: float) -> float:
     """Signed distance of the point (x, y) of the body frame to the union of the pieces (inside: to the deepest piece)."""
     least = np.inf

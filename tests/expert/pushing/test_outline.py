@@ -4,7 +4,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from expert.pushing.outline import clearance, outline, touch
+from expert.pushing.outline import clearance, distance_up_to, outline, touch
 from tests.support.pushing import TEE
 
 ORIGIN = np.array([0.0, 45.0])
@@ -21,6 +21,7 @@ def test_distance_is_that_of_shapely_with_a_sign(x, y):
         expected = piece.exterior.distance(point)
         assert abs(distance) == pytest.approx(expected, abs=1e-9)
         assert distance <= 0 or not piece.contains(point)
+        assert distance_up_to(EDGES, k, x, y, 20.0) == pytest.approx(min(distance, 20.0), abs=1e-9)
 
 
 @given(coordinates, coordinates)
