@@ -10,6 +10,7 @@ import numpy as np
 
 from expert.drawing.canvas import new_figure, save_figure
 from expert.drawing.grasp_figures import draw_errors, draw_poses
+from expert.drawing.marks import legend
 from expert.grasping.executions import force_closure_comparison
 from expert.grasping.synthesis import solve
 from expert.problems.grasp import GraspProblem
@@ -32,7 +33,9 @@ left, middle, right = figure.subfigures(1, 3, squeeze=False, width_ratios=(1, 1,
 draw_poses(left.subplots(), task, starts[:SHOWN], np.empty((0, 2)), "starts")
 for axes, (name, (poses, fingers)) in zip(middle.subplots(2, 1), ends.items(), strict=True):
     draw_poses(axes, task, poses[:SHOWN], fingers, f"ends: {name}")
-    print(f"{name}: median error {np.median(errors[name]):.1e}, largest {errors[name].max():.1e} of the size")
+    median, largest = 100 * np.median(errors[name]), 100 * errors[name].max()
+    print(f"{name}: median error {median:.4f} %, largest {largest:.4f} % of the size")
 draw_errors(right.subplots(), errors)
+legend(figure, "starts", "goal", "finger")
 save_figure(figure, output)
 print(f"picture in {output}")

@@ -26,6 +26,7 @@ from expert.geometry.pose import to_world
 from expert.problems.cage import Arrangement, CageProblem, CageSolution
 from expert.verify.cage.check import verify_cage
 from expert.verify.cage.report import CageReport
+from expert.world.slices import free_components
 
 VIEWS = ("workspace", "slice", "component")
 RATE = 12.0
@@ -94,7 +95,14 @@ def _shown(
             names += ["gripper"] * (bool(task.grippers) or tripod)
         names += ["wall"] * bool(arrangement.walls)
     if "slice" in views:
-        names += ["obstacle of a finger", "free around the start", "closed curve in obstacles"]
+        walls, angle = arrangement.wall_ends, float(arrangement.pose[2])
+        parts = len(free_components(arrangement.shape, arrangement.fingers, walls, angle))
+        names += [
+            "obstacle of a finger",
+            *["free around the start", "closed curve in obstacles"][: 2 * parts],
+        ]
+        names += ["free elsewhere"] * (parts > 1)
+    names += ["start"] * bool(set(views) - {"workspace"})
     return names + ["way out"] * bool(len(report.path) and set(views) - {"slice"})
 
 

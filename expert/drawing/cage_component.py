@@ -6,7 +6,7 @@ from matplotlib import colormaps
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-from expert.drawing.marks import FINGER, LABEL, NUMBER, PATH
+from expert.drawing.marks import LABEL, NUMBER, ORIGIN, PATH
 from expert.geometry.pose import Array
 from expert.problems.cage import Arrangement
 from expert.verify.cage.report import CageReport
@@ -28,7 +28,7 @@ def draw_component(axes: Axes3D, arrangement: Arrangement, report: CageReport) -
         axes.plot(*MILLIMETRES * steps[:, :2].T, np.degrees(steps[:, 2]), color=PATH, lw=1.4)
         axes.set_title("way out", fontsize=LABEL)
     axes.computed_zorder = False  # the start lies inside
-    axes.scatter(0, 0, 0, color=FINGER, s=30, depthshade=False, zorder=10)
+    axes.scatter(0, 0, 0, color=ORIGIN, marker="+", s=70, linewidths=1.6, depthshade=False, zorder=10)
     for axis, label in ((axes.xaxis, "Δx [mm]"), (axes.yaxis, "Δy [mm]"), (axes.zaxis, "Δθ [deg]")):
         axis.set_label_text(label, fontsize=LABEL)
         axis.set_pane_color((0.97, 0.97, 0.97, 1.0))

@@ -12,6 +12,7 @@ from expert.drawing.marks import (
     HALO,
     LABEL,
     NUMBER,
+    ORIGIN,
     WALL,
     finger_colour,
     scale_bar,
@@ -20,7 +21,6 @@ from expert.geometry.pose import Array
 from expert.problems.cage import Arrangement
 from expert.world.slices import free_components, obstacles_at
 
-START, LOOP = "#111111", "#111111"
 SMALL = 0.1
 """A free component below this share of the picture is shown once more, enlarged."""
 HALVINGS, MIDDLE = 12, 0.7
@@ -41,7 +41,7 @@ def draw_slice(axes: Axes, arrangement: Arrangement) -> None:
     around = [p for p in free if p.intersects(start)]
     for component in around:
         loop = enclosing_loop(component, obstacles)
-        axes.plot(*loop.T, color=LOOP, lw=1.3, ls=(0, (3, 2)), zorder=5)
+        axes.plot(*loop.T, color=ORIGIN, lw=1.3, ls=(0, (3, 2)), zorder=5)
     corners = shapely.get_coordinates(obstacles)
     framed_axes(axes, corners, 0.04)
     scale_bar(axes)
@@ -84,7 +84,7 @@ def _draw_free(axes: Axes, arrangement: Arrangement, free: list[shapely.Polygon]
         axes.fill(*np.array(component.exterior.coords).T, color=colour, ec=FREE, lw=0.9, zorder=3)
         for hole in component.interiors:
             axes.fill(*np.array(hole.coords).T, color="white", ec=FREE, lw=0.8, zorder=3)
-    axes.plot(*arrangement.pose[:2], "+", color=START, ms=8, mew=1.4, zorder=6)
+    axes.plot(*arrangement.pose[:2], "+", color=ORIGIN, ms=8, mew=1.4, zorder=6)
 
 
 def _enlarge(

@@ -20,8 +20,8 @@ FINGER, FINGER_FORCE, REACTION = "#c8102e", "#1a8a3c", "#1f5fbf"
 """Red fingers, green finger forces, blue reactions, as in the thesis's Fig. 3-6."""
 START, GOAL, PATH = "#8d8678", "#7a3db8", "#1f5fbf"
 """Grey starts, purple goal, blue paths, as in the thesis's Fig. 5-28."""
-FREE, ELSEWHERE = "#2b7fd0", "#d3e6f7"
-"""Of configuration space: the part around the start, and other bounded parts."""
+FREE, ELSEWHERE, ORIGIN = "#2b7fd0", "#d3e6f7", "#111111"
+"""Of configuration space: the part around the start, other bounded parts, the start and curves around it."""
 FINGERS = (FINGER, "#1a8a3c", "#7a4fb5", "#d9822b", "#0e8c9c", "#b5527a", "#6b6b2f")
 """One colour each, where pictures tell fingers apart."""
 CAPTION, LABEL, NUMBER = 9, 8, 7
@@ -179,8 +179,8 @@ ENTRIES: dict[str, Callable[[], Any]] = {
     "obstacle of a finger": lambda: tuple(Patch(color=colour, alpha=0.28) for colour in FINGERS[:3]),
     "free around the start": lambda: Patch(color=FREE),
     "free elsewhere": lambda: Patch(facecolor=ELSEWHERE, edgecolor=FREE),
-    "closed curve in obstacles": lambda: _line("#111111", lw=1.3, ls=(0, (3, 2))),
-    "start": lambda: _line("#111111", ls="", marker="+", ms=8, mew=1.4),
+    "closed curve in obstacles": lambda: _line(ORIGIN, lw=1.3, ls=(0, (3, 2))),
+    "start": lambda: _line(ORIGIN, ls="", marker="+", ms=8, mew=1.4),
     "starts": lambda: _line(START, lw=0.7),
     "executions": lambda: Patch(facecolor=OBJECT, edgecolor=EDGE, alpha=0.7),
     "goal": lambda: _line(GOAL, lw=1.3),

@@ -81,8 +81,8 @@ def test_each_view_is_drawn_alone_from_a_problem_file_with_given_fingers(view: s
     assert main(["draw", str(PROBLEMS / "i_given.yaml"), "--view", view, "-o", str(picture)]) == 0
     with Image.open(picture) as image:
         shown = np.asarray(image.convert("RGB"))
-    wanted = {"workspace": OBJECT, "slice": FREE, "component": FINGER}[view]
-    assert coloured(shown[40:-60], wanted).sum() > 20
+    wanted = {"workspace": OBJECT, "slice": FREE, "component": "#21918c"}[view]
+    assert coloured(shown[40:-60], wanted, 40).sum() > 20
     absent = {"workspace": FREE, "slice": OBJECT, "component": OBJECT}[view]
     assert coloured(shown[40:-60], absent, 4).sum() == 0
 
@@ -102,4 +102,8 @@ def test_the_gallery_shows_what_make_figures_draws() -> None:
     assert names == set(re.findall(r"\(gallery/cage_(\w+)\.png\)", page))
     for name in names:
         assert (PROBLEMS / f"{name}.yaml").exists()
-        assert Path(f"docs/gallery/cage_{name}.png").stat().st_size < 100_000
+        (picture,) = frames_of(Path(f"docs/gallery/cage_{name}.png"))
+        workspace, space, _ = np.array_split(picture, 3, axis=1)
+        assert coloured(workspace, OBJECT, 30).mean() > 0.05
+        assert coloured(workspace, FINGER, 40).sum() > 20
+        assert coloured(space, FREE, 40).sum() > 20
