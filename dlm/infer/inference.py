@@ -11,6 +11,7 @@ from datasets.limits import Number, check_numbers
 from datasets.motions import TaskSettings
 from dlm.infer.clip import Clip, VideoFile, read_clip
 from dlm.infer.segmentation import Segmentation
+from dlm.infer.steadiness import camera_shift
 from dlm.infer.view import View, find_floor, lowest_row, view_of
 from dlm.perception import Perceived, PerceptionSettings, perceive
 from dlm.simulator.replay import Replay, replay
@@ -19,6 +20,7 @@ from dlm.structured.trial import Trial
 from expert.errors import InvalidProblem
 from expert.files import problem_for, solution_fields
 from expert.geometry.polygon import diameter
+from expert.geometry.pose import to_world
 from expert.problems.contact import ContactTask, Plan
 from expert.world.values import require
 
@@ -30,6 +32,8 @@ EXTENTS = (28.0, 24.0, 34.0)
 """Of the object in what perception is shown, where the video has as many pixels; others are tried where the first fits badly."""
 NEEDLESS = 0.15
 """Corners that change the outline by less are left out [pixels that perception is shown]."""
+STEADY = 0.35
+"""Shift of the surroundings that is no movement of the camera [pixels of the video]."""
 UNKNOWN_SCALE = 1e-3
 """Metres per pixel while the object's size has yet to be measured in pixels."""
 
@@ -159,6 +163,10 @@ def look(
         if seen.status == "ok":
             break
     *_, view, seen = min(tried)
+    shift = camera_shift(clip.frames, view.around(to_world(seen.poses, seen.vertices)))
+    if shift > STEADY and seen.status == "ok":
+        reason = f"the camera moves, by up to {shift:.1f} pixels: hold it still, or steady the video"
+        seen = replace(seen, status="poor_fit", reason=reason)
     seen = simplified(seen, NEEDLESS * view.camera.scale)
     if given.object_size is None:
         return view, seen

@@ -1,9 +1,11 @@
 """The fitted scene as the labels of a data set describe one, and whether it explains the video."""
 
+from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
 import shapely
+from scipy.ndimage import uniform_filter
 
 from datasets.render import Camera
 from dlm.perception.appearance import Appearance
@@ -17,16 +19,28 @@ UNEXPLAINED = 4.0
 """Rms difference that even a noiseless video may have [grey levels]."""
 MOST_HIDDEN = 0.4
 """Share of the outline, over all frames, that may be hidden."""
+ODD = 0.15
+"""Error of coverage, mean over 3 x 3 pixels, that even a noiseless video may have."""
 LOW = 0.1
 """Vertices as low as the lowest, when the first one is chosen [pixels]."""
 
 
+@dataclass(frozen=True)
+class Evidence:
+    """What the fit is held against: pixels that were trusted in the end, all that show object or background, and colours."""
+
+    trusted: Observation
+    everything: Observation
+    look: Appearance
+
+
 def answer(
-    scene: MovingPolygon, seen: Observation, look: Appearance, camera: Camera, settings: PerceptionSettings
+    scene: MovingPolygon, evidence: Evidence, camera: Camera, settings: PerceptionSettings
 ) -> Perceived:
     """In metres, about the centroid, the lowest vertex first."""
-    residual, hidden = explained(scene, seen, look)
-    status, reason = _verdict(scene, residual, hidden, look.noise, settings)
+    look = evidence.look
+    residual, hidden = explained(scene, evidence.trusted, look)
+    status, reason = _verdict(scene, evidence, residual, hidden, settings)
     placed = scene.placed() if is_simple(scene.vertices) else _hull(scene)
     outline = camera.to_world(placed * [1, -1] + [0, camera.size])
     low = np.flatnonzero(outline[0, :, 1] < outline[0, :, 1].min() + LOW * camera.scale)
@@ -55,9 +69,18 @@ def explained(scene: MovingPolygon, seen: Observation, look: Appearance) -> tupl
     return float(np.median(look.contrast) * np.sqrt(squares.mean())) if visible.any() else np.inf, hidden
 
 
+def odd_spot(scene: MovingPolygon, seen: Observation) -> float:
+    """Largest error of coverage, mean over 3 x 3 pixels, next to the object: noise is small there, a finger in the object's
+    colour is not."""
+    share, _ = modelled(scene, seen)
+    error = np.where(seen.weight > 0, share - seen.share, 0.0)
+    return float(np.abs(uniform_filter(error, size=(1, 3, 3))).max())
+
+
 def _verdict(
-    scene: MovingPolygon, residual: float, hidden: float, noise: float, settings: PerceptionSettings
+    scene: MovingPolygon, evidence: Evidence, residual: float, hidden: float, settings: PerceptionSettings
 ) -> tuple[Status, str]:
+    noise = evidence.look.noise
     allowed = settings.tolerance * noise + UNEXPLAINED
     if not is_simple(scene.vertices):
         return "poor_fit", "the outline crosses itself; its convex hull is given"
@@ -65,6 +88,12 @@ def _verdict(
         return (
             "poor_fit",
             f"video and model differ by {residual:.1f} grey levels along the outline, more than {allowed:.1f}",
+        )
+    spot = odd_spot(scene, evidence.everything)
+    if spot > ODD + noise / float(np.median(evidence.look.contrast)):
+        return (
+            "poor_fit",
+            f"next to the object {100 * spot:.0f} % of a few pixels change with it but are no part of its outline",
         )
     if hidden > MOST_HIDDEN:
         return (

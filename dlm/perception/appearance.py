@@ -6,7 +6,7 @@ import numpy as np
 from scipy import ndimage
 
 from datasets.render import Camera, Frames, ground_coverage
-from dlm.perception.background import background_of
+from dlm.perception.background import Background, background_of
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import NDArrayBool
 from expert.geometry.pose import Array
@@ -17,6 +17,8 @@ FOREIGN = 25.0
 """A colour this far from every mixture of object and background is something else [grey levels]."""
 FAINTEST = 12.0
 """Colours differ from this distance on [grey levels]."""
+LEAST_MOVING = 0.03
+"""Of a thing that moves, so much changes colour at least."""
 FEWEST = 8
 """Pixels that tell the object's colour."""
 CROSS = np.array([[[0, 1, 0], [1, 1, 1], [0, 1, 0]]])
@@ -50,13 +52,17 @@ def separate(video: Frames, camera: Camera, floor: bool, blur: float = 0.0, code
     behind = background_of(images, ground)
     light, noise = behind.light, float(np.hypot(behind.noise, codec))
     plain = images / light[..., None]
-    line = _object_colour(plain, behind.image, noise, blur) - behind.wall
+    line = _object_colour(plain, behind, noise, blur) - behind.wall
     length = float(line @ line)
     share = ((plain - behind.image) * line).sum(axis=-1) / length
     off = np.linalg.norm(plain - behind.image - share[..., None] * line, axis=-1) * light
     contrast = light * length**0.5
     precision = 1 / ((noise / contrast) ** 2 + MODEL_ERROR**2)
-    foreign = (off > max(6 * noise, FOREIGN)) | _half_covered_areas(share, noise / contrast)
+    odd = off > max(6 * noise, FOREIGN)
+    # What moves along, as fingers do, mixes its colour into the outline all the way.
+    odd |= ndimage.binary_dilation(odd & ~odd.all(axis=0), CROSS)
+    foreign = odd | _half_covered_areas(share, noise / contrast)
+    foreign |= _standing(np.where(foreign, 0.0, share))
     return Appearance(share, np.broadcast_to(precision, share.shape), foreign, noise, contrast)
 
 
@@ -71,13 +77,25 @@ def _half_covered_areas(share: Array, deviation: Array) -> NDArrayBool:
     return np.asarray(ndimage.binary_dilation(odd, np.ones((1, 3, 3))))
 
 
-def _object_colour(plain: Array, background: Array, noise: float, blur: float) -> Array:
+def _standing(share: Array) -> NDArrayBool:
+    """Pieces in the object's colour that stand still while others move (T, h, w); nothing where all of them stand."""
+    moved = np.ptp(share, axis=0) > 0.5
+    things = share > 0.5
+    moving = _pieces_with(moved, things, 0.0)
+    if not moving.any(axis=(1, 2)).all():
+        return np.zeros_like(things)
+    return np.asarray(ndimage.binary_dilation(things & ~moving, CROSS))
+
+
+def _object_colour(plain: Array, behind: Background, noise: float, blur: float) -> Array:
     """The commonest colour well inside what differs from the background; where something moves, inside what moves."""
-    difference = np.linalg.norm(plain - background, axis=-1)
+    difference = np.linalg.norm(plain - behind.image, axis=-1)
     different = difference > max(5 * noise, FAINTEST)
-    moves = np.linalg.norm(np.ptp(plain, axis=0), axis=-1) > max(8 * noise, 2 * FAINTEST)
-    if (different & moves).any():
-        different = _pieces_with(moves, different)
+    # What compression leaves near edges stays where it is, and needs no allowance here.
+    moves = np.linalg.norm(np.ptp(plain, axis=0), axis=-1) > max(8 * behind.noise, 2 * FAINTEST)
+    moving = _pieces_with(moves, different, LEAST_MOVING)
+    if moving.any():
+        different = moving
     for depth in range(1 + int(np.ceil(2 * blur)), -1, -1):
         inner = ndimage.binary_erosion(different, CROSS, iterations=depth) if depth else different
         if inner.sum() >= FEWEST:
@@ -93,10 +111,11 @@ def _object_colour(plain: Array, background: Array, noise: float, blur: float) -
     )
 
 
-def _pieces_with(mark: NDArrayBool, masks: NDArrayBool) -> NDArrayBool:
-    """The connected pieces of each mask (T, h, w) that contain a marked pixel (h, w)."""
+def _pieces_with(mark: NDArrayBool, masks: NDArrayBool, least: float) -> NDArrayBool:
+    """The connected pieces of each mask (T, h, w) of which a larger share than `least` is marked (h, w)."""
     kept = np.zeros_like(masks)
     for t, mask in enumerate(masks):
-        pieces, _ = ndimage.label(mask)
-        kept[t] = mask & np.isin(pieces, np.unique(pieces[mask & mark]))
+        pieces, count = ndimage.label(mask)
+        area, marked = (np.bincount(pieces[m], minlength=count + 1) for m in (mask, mask & mark))
+        kept[t] = mask & (marked > least * area)[pieces]
     return kept

@@ -3,7 +3,7 @@
 import numpy as np
 
 from datasets.render import Camera, Frames
-from dlm.perception.answer import answer
+from dlm.perception.answer import Evidence, answer
 from dlm.perception.appearance import Appearance, separate
 from dlm.perception.contacts import snap_contacts
 from dlm.perception.fit import MovingPolygon, Observation, calibrated, fit, without_outliers
@@ -33,11 +33,12 @@ def perceive(
     look = separate(video, camera, settings.floor, settings.blur, settings.codec)
     windows = segment(look, MARGIN + int(np.ceil(3 * settings.blur)))
     seen = _observation(look, windows, settings)
+    everything = seen
     scene, seen = _best_start(seen, settings)
     scene, _ = prune(scene, seen)
     if settings.floor:
         scene = snap_contacts(scene, seen, camera.below / camera.scale, settings.snap)
-    return answer(scene, seen, look, camera, settings)
+    return answer(scene, Evidence(seen, everything, look), camera, settings)
 
 
 def _best_start(seen: Observation, settings: PerceptionSettings) -> tuple[MovingPolygon, Observation]:

@@ -1,10 +1,13 @@
 """Real mp4 files of rendered tasks in, actions out; what the object then does in the simulator is held against the truth."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 
+from datasets.render import Colour, Frames, Palette
 from datasets.specification import Sample
 from dlm.infer import Clip, Given, Inference, infer, read_clip
 from dlm.simulator.replay import replay
@@ -13,7 +16,7 @@ from expert.errors import InvalidProblem
 from expert.files import read_solution
 from expert.files.document import save
 from expert.verify.plan.check import check_plan
-from tests.support.clips import SCALE, drawn, write_clip
+from tests.support.clips import SCALE, drawn, with_discs, with_fingers, write_clip
 
 KNOWN = Given(scale=SCALE)
 
@@ -113,3 +116,87 @@ def test_frames_without_their_times_are_no_clip(tasks: TaskBatch) -> None:
         InvalidProblem, match=r"video: expected a file, or Clip\(frames=..., times=...\), got ndarray"
     ):
         infer(tasks.samples[0].video, KNOWN)  # type: ignore[arg-type]
+
+
+def clip_of(frames: Frames) -> Clip:
+    return Clip(frames=frames, times=0.1 * np.arange(len(frames)))
+
+
+def plain_video(sample: Sample) -> Frames:
+    return drawn(sample.task.body.vertices, sample.task.trajectory.poses)
+
+
+def assert_follows_truth(answer: Inference, sample: Sample, within: float = 0.1) -> None:
+    """Planned, for the very motion, to so many mm and degrees."""
+    error = np.abs(answer.planned.perceived.poses - sample.task.trajectory.poses).max(axis=0)
+    assert answer.status == "planned", answer.reason
+    assert np.all(error < [1e-3 * within, 1e-3 * within, np.deg2rad(within)])
+
+
+BESIDE: dict[str, tuple[slice, slice]] = {
+    "strip at the left edge": (slice(None), slice(0, 12)),
+    "strip at the top": (slice(0, 14), slice(None)),
+    "strip at the bottom": (slice(196, None), slice(None)),
+    "patch": (slice(20, 50), slice(150, 190)),
+}
+
+
+@pytest.mark.parametrize(
+    "colour", [Palette().object, (40, 120, 200), (20, 20, 20)], ids=["own", "blue", "black"]
+)
+@pytest.mark.parametrize("where", BESIDE)
+def test_what_stands_still_beside_the_object_is_not_taken_for_it(
+    where: str, colour: Colour, tasks: TaskBatch
+) -> None:
+    sample = tasks.samples[2]
+    frames = plain_video(sample)
+    frames[:, *BESIDE[where]] = colour
+    assert_follows_truth(infer(clip_of(frames), KNOWN), sample)
+
+
+@pytest.mark.parametrize("colour", [(200, 60, 40), (40, 100, 200), (20, 20, 20)])
+@pytest.mark.parametrize("where", ["strip at the top", "strip at the bottom"])
+def test_strips_of_wide_pictures_are_not_taken_for_the_floor_or_the_object(
+    where: str, colour: Colour, tasks: TaskBatch
+) -> None:
+    """A pale object, from whose colour the strip's is further than its own is from the wall's."""
+    sample = tasks.samples[2]
+    pale = Palette(background=(200, 200, 195), object=(170, 150, 140), ground=(90, 100, 110))
+    frames = np.pad(
+        drawn(sample.task.body.vertices, sample.task.trajectory.poses, pale),
+        [(0, 0), (0, 0), (120, 120), (0, 0)],
+        "edge",
+    )
+    frames[:, *BESIDE[where]] = colour
+    assert_follows_truth(infer(clip_of(frames), KNOWN), sample)
+
+
+@pytest.mark.parametrize("k", range(4))
+@pytest.mark.parametrize("colour", [(40, 40, 40), (50, 90, 200)])
+def test_fingers_that_move_along_are_no_part_of_the_object(k: int, colour: Colour, tasks: TaskBatch) -> None:
+    sample = tasks.samples[k]
+    answer = infer(clip_of(with_fingers(sample, colour)), KNOWN)
+    assert_follows_truth(answer, sample, within=0.3)
+    outlines = (
+        shapely.Polygon(v).exterior for v in (answer.planned.perceived.vertices, sample.task.body.vertices)
+    )
+    assert shapely.hausdorff_distance(*outlines) < 1e-3  # the fingers stand out by 8 mm
+
+
+def test_something_else_that_moves_is_not_taken_for_the_object(tasks: TaskBatch) -> None:
+    sample = tasks.samples[0]
+    path = np.column_stack([np.linspace(30, 60, 5), np.full(5, 40.0)])
+    for colour in ((40, 40, 40), (150, 200, 150)):
+        frames = with_discs(plain_video(sample), path, colour, radius=9.0)
+        assert_follows_truth(infer(clip_of(frames), KNOWN), sample)
+
+
+@pytest.mark.parametrize("amplitude", [1, 3])
+@pytest.mark.parametrize("k", [0, 2])
+def test_a_shaking_camera_is_a_poor_fit_and_said_so(k: int, amplitude: int, tasks: TaskBatch) -> None:
+    frames = plain_video(tasks.samples[k])
+    for t, way in enumerate((0, 1, -1, 1, -1)):
+        frames[t] = np.roll(frames[t], amplitude * way, axis=0)
+    answer = infer(clip_of(frames), KNOWN)
+    assert answer.status == "poor_fit"
+    assert re.search(r"the camera moves, by up to \d|along the outline", answer.reason)
