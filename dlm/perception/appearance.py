@@ -60,7 +60,7 @@ def separate(video: Frames, camera: Camera, floor: bool, blur: float = 0.0, code
     precision = 1 / ((noise / contrast) ** 2 + MODEL_ERROR**2)
     odd = off > max(6 * noise, FOREIGN)
     # What moves along, as fingers do, mixes its colour into the outline all the way.
-    odd |= ndimage.binary_dilation(odd & ~odd.all(axis=0), CROSS)
+    odd |= ndimage.binary_dilation(odd & ~odd.all(axis=0), CROSS, iterations=2)
     foreign = odd | _half_covered_areas(share, noise / contrast)
     foreign |= _standing(np.where(foreign, 0.0, share))
     return Appearance(share, np.broadcast_to(precision, share.shape), foreign, noise, contrast)

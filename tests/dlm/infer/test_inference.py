@@ -180,7 +180,8 @@ def test_fingers_that_move_along_are_no_part_of_the_object(k: int, colour: Colou
     outlines = (
         shapely.Polygon(v).exterior for v in (answer.planned.perceived.vertices, sample.task.body.vertices)
     )
-    assert shapely.hausdorff_distance(*outlines) < 1e-3  # the fingers stand out by 8 mm
+    # A finger would stand out by 8 mm; what one hides in every frame may be anything.
+    assert shapely.hausdorff_distance(*outlines) < 3e-3
 
 
 def test_something_else_that_moves_is_not_taken_for_the_object(tasks: TaskBatch) -> None:
