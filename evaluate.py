@@ -5,6 +5,7 @@
 
 import shlex
 import sys
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
@@ -13,13 +14,14 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 from rich.console import Console
 
-from datasets.entry import entry_point
-from datasets.store import write_whole
+from datasets.entry import entry_point, swept
 from dlm.evaluation.baselines import unlearned
 from dlm.evaluation.extras import read_extras
+from dlm.evaluation.report import FILES
 from dlm.evaluation.study import Study
 from dlm.evaluation.trained import read_trained
 from dlm.tasks import first, read_all
+from expert.files.output import Output, folder
 from expert.world.values import require
 
 build = partial(instantiate, _convert_="object")
@@ -46,15 +48,17 @@ def main(cfg: DictConfig) -> None:
     command = shlex.join(["python", Path(sys.argv[0]).name, *sys.argv[1:]])
     data = {name: batch.fingerprint for name, batch in tasks.items()}
     origin = {"command": command, "seeds": list(cfg.seeds), "data (sha256)": data}
-    with Console(stderr=True).status("simulating, timing, drawing"):
+    with ExitStack() as stack:
+        place = stack.enter_context(folder(Path(cfg.results or cfg.output) / swept("results", "output")))
+        outputs = {name: stack.enter_context(Output(place / name)) for name in FILES}
+        stack.enter_context(Console(stderr=True).status("simulating, timing, drawing"))
         outcomes = study.outcomes()
         table = study.table(outcomes, origin)
         files = study.report(outcomes, table, examples=cfg.examples, extras=extras).files()
-    folder = Path(cfg.results or cfg.output)
-    for name, content in files.items():
-        write_whole(folder / name, content)
+        for name, content in files.items():
+            outputs[name].deliver(content)
     print(table.as_markdown())
-    print(f"report: {(folder / 'report.html').resolve()}")
+    print(f"report: {(place / 'report.html').resolve()}")
 
 
 if __name__ == "__main__":

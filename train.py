@@ -5,13 +5,14 @@
 
 import copy
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from hydra.core.hydra_config import HydraConfig
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
-from datasets.entry import entry_point
+from datasets.entry import entry_point, swept
 from dlm.evaluation.watch import watch
 from dlm.tasks import read_all
 from dlm.training.orchestrate import Run, seed_folder, train
@@ -25,17 +26,18 @@ def main(cfg: DictConfig) -> None:
     """Train the chosen stages on the chosen seeds, each after the one whose weights it starts from."""
     seeds = [cfg.seed] if cfg.seeds is None else list(cfg.seeds)
     require(len(seeds) > 0, "seeds", "at least one seed", seeds, "seeds=[0,1,2]")
-    runs = [run_of(cfg, seed) for seed in seeds]
+    output = Path(cfg.output) / swept("seed", "stage", "output")
+    runs = [run_of(cfg, seed, output) for seed in seeds]
     for line in train(runs, jobs=cfg.jobs):
         print(line, flush=True)
     data, stages = HydraConfig.get().runtime.choices["data"], ",".join(cfg.stages)
-    print(f"curves: tensorboard --logdir {runs[0].folder / 'tensorboard' if len(runs) == 1 else cfg.output}")
+    print(f"curves: tensorboard --logdir {runs[0].folder / 'tensorboard' if len(runs) == 1 else output}")
     print(
-        f"next: python evaluate.py output={cfg.output} seeds=[{','.join(map(str, seeds))}] stages=[{stages}] data={data}"
+        f"next: python evaluate.py output={output} seeds=[{','.join(map(str, seeds))}] stages=[{stages}] data={data}"
     )
 
 
-def run_of(cfg: DictConfig, seed: int) -> Run:
+def run_of(cfg: DictConfig, seed: int, output: Path) -> Run:
     """The stages of one seed."""
     own = copy.deepcopy(cfg)
     own.seed = seed
@@ -48,7 +50,7 @@ def run_of(cfg: DictConfig, seed: int) -> Run:
         schedule=build(plain["schedule"]),
         read=partial(read_all, plain["data"], train_tasks=own.train_tasks),
         watch=partial(watch, simulator=build(plain["watch"])),
-        folder=seed_folder(own.output, seed),
+        folder=seed_folder(output, seed),
         settings={
             key: plain[key] for key in ("model", "solver", "schedule", "seed", "train_tasks", "stages")
         },

@@ -8,7 +8,10 @@ from pathlib import Path
 from typing import ParamSpec
 
 import hydra
+from hydra.core.hydra_config import HydraConfig
+from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.errors import HydraException
+from hydra.types import RunMode
 from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
@@ -29,6 +32,21 @@ def entry_point(config: str) -> Callable[[Job], Callable[[], None]]:
         return _one_line(command)
 
     return decorate
+
+
+def swept(*named: str) -> str:
+    """Of a multirun's job: the swept overrides that tell it from the others, as part of a name; empty otherwise.
+
+    named: options that tell jobs' results apart already.
+    """
+    job = HydraConfig.get()
+    if job.mode != RunMode.MULTIRUN:
+        return ""
+    asked = [word for word in sys.argv[1:] if "=" in word and not word.startswith("-")]
+    overrides = OverridesParser.create().parse_overrides(asked)
+    telling = {o.key_or_group for o in overrides if o.is_sweep_override()} - set(named)
+    own = (word for word in job.overrides.task if word.partition("=")[0].lstrip("+") in telling)
+    return ",".join(sorted(own)).replace("/", "-")
 
 
 def _one_line(function: Callable[P, None]) -> Callable[P, None]:

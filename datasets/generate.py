@@ -6,7 +6,7 @@ from pathlib import Path
 from hydra.utils import instantiate
 from omegaconf import DictConfig
 
-from datasets.entry import entry_point
+from datasets.entry import entry_point, swept
 from datasets.generation import Generation, generate, versions
 
 
@@ -15,6 +15,8 @@ def main(cfg: DictConfig) -> None:
     """Make one data set and say where it is."""
     specification = instantiate(cfg.dataset, _convert_="object")
     out = Path(cfg.out or f"data/{specification.name}-seed{cfg.seed}")
+    if apart := swept("dataset", "seed", "out"):
+        out = out.with_name(f"{out.name},{apart}")
     now = versions()
     manifest = generate(
         Generation(

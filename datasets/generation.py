@@ -31,6 +31,7 @@ from datasets.store import (
     write_whole,
 )
 from expert.errors import InvalidProblem
+from expert.files.output import claimed
 from expert.world.values import require
 
 PACKAGES = ("certified-manipulation", "numpy", "scipy", "shapely", "numba", "daqp", "opencv-python-headless")
@@ -95,8 +96,13 @@ def generate(job: Generation) -> Manifest:
     """Make the data set, or what is missing of it; returns its manifest.
 
     Nothing is done to a complete data set of the same settings and seed.  Raises InvalidProblem where `out` holds
-    anything else, SolverFailed where a task cannot be labelled or a worker dies.
+    anything else or another process is at it, SolverFailed where a task cannot be labelled or a worker dies.
     """
+    with claimed(job.out):
+        return _generate(job)
+
+
+def _generate(job: Generation) -> Manifest:
     request = job.request()
     if (done := _prepare(job, request)) is not None:
         return done

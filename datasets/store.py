@@ -9,7 +9,6 @@ The bytes of a shard depend on specification, seed and versions alone: zip entri
 import hashlib
 import io
 import json
-import os
 import struct
 import zipfile
 import zlib
@@ -24,6 +23,7 @@ from datasets.fields import FIELDS, arrays_of, sample_of
 from datasets.motions import TaskSettings
 from datasets.specification import FailedDraw, Sample, Specification
 from expert.errors import InvalidProblem
+from expert.files.output import folder, write_atomically
 
 SCHEMA = 1
 KIND = "manipulation tasks"
@@ -39,14 +39,9 @@ def shard_path(folder: Path, shard: int) -> Path:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Replace a file at once: whoever is killed here leaves the old file or the new one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
-    with draft.open("wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    draft.replace(path)
+    """Replace a file at once: whoever is killed here leaves the old file or the new one.  Raises InvalidProblem."""
+    with folder(path.parent):
+        write_atomically(path, data)
 
 
 def sha256(data: bytes) -> str:

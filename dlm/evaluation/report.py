@@ -12,6 +12,12 @@ from matplotlib.figure import Figure
 from dlm.evaluation.extras import Extra
 from dlm.evaluation.table import DATASETS, DETAILS, Line, Table, comparison_rows, order_rows
 
+FILES = (
+    *("table_4_1.md", "table_4_1.csv", "table_4_1.json"),
+    *("figure_4_6.png", "figure_4_7.png", "report.html"),
+)
+"""What a report is written to."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Example:
@@ -59,14 +65,15 @@ class Report:
 
     def files(self) -> dict[str, bytes]:
         """Table, figures and page, by the names of their files."""
-        return {
-            "table_4_1.md": self.table.as_markdown().encode(),
-            "table_4_1.csv": self.table.as_csv().encode(),
-            "table_4_1.json": json.dumps(self.table.as_json(), indent=1).encode(),
-            "figure_4_6.png": png(self.curves),
-            "figure_4_7.png": png(self.qualitative),
-            "report.html": self.html().encode(),
-        }
+        contents = (
+            self.table.as_markdown().encode(),
+            self.table.as_csv().encode(),
+            json.dumps(self.table.as_json(), indent=1).encode(),
+            png(self.curves),
+            png(self.qualitative),
+            self.html().encode(),
+        )
+        return dict(zip(FILES, contents, strict=True))
 
 
 def template(name: str) -> Template:

@@ -10,45 +10,38 @@ from pathlib import Path
 from omegaconf import DictConfig
 from rich.console import Console
 
-from datasets.entry import entry_point
+from datasets.entry import entry_point, swept
 from dlm.infer.clip import VideoFile
 from dlm.infer.drawing import draw_inference
 from dlm.infer.inference import Given, Inference, infer
 from dlm.infer.segmentation import Segmentation
 from dlm.structured import StructuredModel
 from dlm.structured.weights import SHIPPED, trained_model
-from expert.files.document import save
+from expert.files.document import encoded
+from expert.files.output import Output, folder, writable
 from expert.world.values import require
 
 NO_PLAN = 4
-NUMBERS = (
-    *("scale", "object_size", "floor", "mass", "friction", "duration"),
-    *("start", "end", "rate", "tolerance"),
-)
 
 
 @entry_point("infer")
 def main(cfg: DictConfig) -> None:
     """Perceive, plan, simulate; write actions and animation."""
-    for name in NUMBERS:
-        require(cfg[name] is None or isinstance(cfg[name], int | float), name, "a number", cfg[name])
-    folder = Path(cfg.out or Path("outputs") / "infer" / Path(cfg.video).stem)
-    require(not folder.exists() or folder.is_dir(), "out", "a folder", f"{folder}, a file")
-    with Console(stderr=True).status("perceiving and planning") as status:
-        answer = infer(
-            VideoFile(path=cfg.video, start=cfg.start, end=cfg.end, rate=cfg.rate),
-            Given(**{field.name: cfg[field.name] for field in fields(Given)}),
-            segmentation=Segmentation(
-                colour=cfg.colour if cfg.colour is None else tuple(cfg.colour),
-                background=cfg.background,
-                tolerance=cfg.tolerance,
-            ),
-            model=chosen_model(cfg.checkpoint),
-            refine=cfg.refine,
-        )
-        status.update("drawing")
-        write(answer, folder)
-    tell(answer, folder)
+    file = VideoFile(path=cfg.video, start=cfg.start, end=cfg.end, rate=cfg.rate)
+    given = Given(**{field.name: cfg[field.name] for field in fields(Given)})
+    told = Segmentation(colour=cfg.colour, background=cfg.background, tolerance=cfg.tolerance)
+    model = chosen_model(cfg.checkpoint)
+    place = Path(cfg.out or Path("outputs") / "infer" / Path(cfg.video).stem) / swept("video", "out")
+    require(not place.exists() or place.is_dir(), "out", "a folder", f"{place}, a file")
+    with folder(place), Output(place / "actions.json") as actions:
+        writable(place / "motion.gif")
+        with Console(stderr=True).status("perceiving and planning") as status:
+            answer = infer(file, given, segmentation=told, model=model, refine=cfg.refine)
+            if answer.plan is not None:
+                actions.deliver(encoded(answer.solution()))
+            status.update("drawing")
+            draw_inference(answer, place / "motion.gif")
+    tell(answer, place)
     if answer.plan is None:
         sys.exit(NO_PLAN)
 
@@ -60,15 +53,7 @@ def chosen_model(checkpoint: str | None) -> StructuredModel | None:
     return trained_model(SHIPPED if checkpoint == "shipped" else Path(checkpoint))
 
 
-def write(answer: Inference, folder: Path) -> None:
-    """Actions (if there is a plan) and animation."""
-    folder.mkdir(parents=True, exist_ok=True)
-    draw_inference(answer, folder / "motion.gif")
-    if answer.plan is not None:
-        save(folder / "actions.json", answer.solution())
-
-
-def tell(answer: Inference, folder: Path) -> None:
+def tell(answer: Inference, place: Path) -> None:
     """What was seen, what is planned, where it is."""
     seen = answer.planned.perceived
     print(
@@ -79,9 +64,9 @@ def tell(answer: Inference, folder: Path) -> None:
     if answer.result is not None:
         mm, deg = answer.result.final_error
         print(f"simulated: ends {mm:.2f} mm and {deg:.2f} deg from the goal")
-    print(f"animation: {folder / 'motion.gif'}")
+    print(f"animation: {place / 'motion.gif'}")
     if answer.plan is not None:
-        actions = folder / "actions.json"
+        actions = place / "actions.json"
         print(f"actions: {actions}; next: python -m expert verify {actions}")
 
 

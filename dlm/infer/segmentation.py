@@ -37,7 +37,7 @@ class Segmentation:
         require(not both, "segmentation", "colour or background", "both", "give one of them")
         check_numbers(self, "segmentation.")
         if self.colour is not None:
-            checked_colour(self.colour, "segmentation.colour")
+            object.__setattr__(self, "colour", checked_colour(self.colour, "segmentation.colour"))
 
     def paint(self, frames: Frames, floor: float) -> Frames:
         """Frames (T, h, w, 3) with a plain object, a plain background, and plain ground below row `floor`."""

@@ -5,7 +5,6 @@ A file holds all that training needs to go on as if it had never stopped.
 """
 
 import json
-import os
 import platform
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -14,10 +13,11 @@ from pathlib import Path
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save as to_bytes
 from torch import Tensor
 
 from expert.errors import InvalidProblem
+from expert.files.output import Output, folder
 
 SCHEMA = 1
 PACKAGES = ("certified-manipulation", "torch", "numpy", "cvxpy", "cvxpylayers", "diffcp", "clarabel", "numba")
@@ -60,18 +60,14 @@ class Checkpoint:
     random: Tensor
 
     def save(self, path: Path) -> None:
-        """Write the file whole or not at all."""
-        path.parent.mkdir(parents=True, exist_ok=True)
+        """Write the file whole or not at all; raises InvalidProblem where that fails, and says where it is kept instead."""
         tensors = {f"model.{k}": v for k, v in self.model.items()}
         tensors |= {f"optimiser.{k}": v for k, v in self.optimiser.items()}
         tensors["random"] = self.random
-        draft = path.with_name(f".{path.name}.{os.getpid()}")
-        try:
-            contiguous = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
-            save_file(contiguous, draft, metadata={"about": json.dumps(asdict(self.about))})
-            os.replace(draft, path)
-        finally:
-            draft.unlink(missing_ok=True)
+        contiguous = {k: v.detach().cpu().contiguous() for k, v in tensors.items()}
+        content = to_bytes(contiguous, metadata={"about": json.dumps(asdict(self.about))})
+        with folder(path.parent), Output(path) as output:
+            output.deliver(content)
 
 
 def load(path: Path, *, command: str) -> Checkpoint:

@@ -20,6 +20,7 @@ from dlm.training.checkpoint import load, read_about, restore_weights
 from dlm.training.loop import Record, Training, Watch, fit
 from dlm.training.stage import Schedule, Stage
 from expert.errors import InvalidProblem
+from expert.files.output import claimed
 from expert.world.values import require
 
 DataSets = Mapping[str, TaskBatch]
@@ -57,7 +58,8 @@ class Run:
             self._start_from(stage.warm_start, policy)
         record = self.record(stage)
         training = Training(policy, stage.loss, tasks[stage.dataset], stage.scheduled(self.schedule))
-        fit(training, record, watch=self.watch(tasks), resume=self.resume)
+        with claimed(self.folder / stage.name):
+            fit(training, record, watch=self.watch(tasks), resume=self.resume)
         return f"{stage.name}: {record.path} ({training.seconds:.0f} s of processor time)"
 
     def record(self, stage: Stage) -> Record:

@@ -33,9 +33,7 @@ class Output:
     def __enter__(self) -> "Output":
         with _one_line(self.path), contextlib.ExitStack() as undo:
             self._target = _replaceable(self.path)
-            self._lock = self._target.with_name(f".{self._target.name}.lock")
-            self._locked = _locked(self._lock, self.path)
-            undo.callback(self._unlock)
+            undo.enter_context(_lock(self._target, self.path))
             handle, name = tempfile.mkstemp(dir=self._target.parent, prefix=f".{self._target.name}.")
             undo.callback(os.unlink, name)
             self._temporary, self._file = Path(name), os.fdopen(handle, "wb")
@@ -71,10 +69,35 @@ class Output:
                 "output", expected=failure.expected, got=failure.got, remedy=f"the result is kept {kept}"
             ) from None
 
-    def _unlock(self) -> None:
-        if self._locked is not None:
-            self._lock.unlink(missing_ok=True)  # while it is still held: nobody else can have it
-            os.close(self._locked)
+
+@contextlib.contextmanager
+def claimed(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Hold a file or folder that is written bit by bit; what it is to lie in is made.
+
+    Raises InvalidProblem where that cannot be, and where another process holds it.  A process that dies lets go.
+    """
+    target = Path(os.path.realpath(path))
+    with contextlib.ExitStack() as undo:
+        with _one_line(target):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            undo.enter_context(_lock(target, Path(path)))
+        yield
+
+
+@contextlib.contextmanager
+def folder(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A folder for results, made where it is missing; where nothing comes of them it goes again.  Raises InvalidProblem."""
+    wanted = Path(path)
+    missing = [place for place in (wanted, *wanted.parents) if not place.exists()]
+    with _one_line(wanted):
+        wanted.mkdir(parents=True, exist_ok=True)
+    try:
+        yield wanted
+    except BaseException:
+        for place in missing:
+            with contextlib.suppress(OSError):
+                place.rmdir()
+        raise
 
 
 def writable(path: str | os.PathLike[str]) -> None:
@@ -114,6 +137,19 @@ def _replaceable(path: Path) -> Path:
             "output", expected="a file that may be replaced", got=f"{path}, which is read-only or no file"
         )
     return target
+
+
+@contextlib.contextmanager
+def _lock(target: Path, path: Path) -> Iterator[None]:
+    """Hold the lock file beside the target, which the user calls `path`."""
+    lock = target.with_name(f".{target.name}.lock")
+    handle = _locked(lock, path)
+    try:
+        yield
+    finally:
+        if handle is not None:
+            lock.unlink(missing_ok=True)  # while it is still held: nobody else can have it
+            os.close(handle)
 
 
 def _locked(lock: Path, path: Path) -> int | None:

@@ -179,3 +179,18 @@ def test_shards_hold_no_clock(small: Specification, made: Path) -> None:
     first = encode_shard([data[0]], failed, small, "f")
     time.sleep(2.1)  # zip entries tell time in steps of two seconds
     assert encode_shard([data[0]], failed, small, "f") == first
+
+
+def test_a_data_set_that_another_process_makes_is_left_alone(small: Specification, tmp_path: Path) -> None:
+    hold = "import sys, time; from expert.files.output import claimed\nwith claimed(sys.argv[1]): print('held', flush=True); time.sleep(60)"
+    out = tmp_path / "shared"
+    with subprocess.Popen([sys.executable, "-c", hold, str(out)], stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout is not None
+        assert other.stdout.readline() == "held\n"
+        with pytest.raises(InvalidProblem, match=f"shared, which process {other.pid} is about to write"):
+            generate(Generation(specification=small, seed=0, out=out, jobs=1))
+        assert not out.exists()
+        other.kill()
+    first = replace(small, count=1)
+    assert generate(Generation(specification=first, seed=0, out=out, jobs=1))["complete"]
+    assert not list(tmp_path.glob(".*"))

@@ -1,3 +1,4 @@
+import errno
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -132,3 +133,31 @@ def test_a_checkpoint_that_names_foreign_classes_is_refused(
     replace(saved, about=replace(saved.about, settings=settings)).save(path)
     with pytest.raises(InvalidProblem, match="expected classes of dlm, got"):
         load(path, command=COMMAND)
+
+
+def test_what_cannot_be_written_is_kept_elsewhere(
+    saved: Checkpoint, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A disk that is full when the work is done."""
+    path, other = tmp_path / "x.safetensors", tmp_path / "elsewhere"
+    saved.save(path)
+    before = path.read_bytes()
+    other.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(other))
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("os.replace", full)
+        with pytest.raises(InvalidProblem, match=r"No space left on device.*the result is kept in"):
+            saved.save(path)
+    assert path.read_bytes() == before
+    (kept,) = other.iterdir()
+    assert load(kept, command=COMMAND).about == saved.about
+
+
+def test_a_place_that_cannot_be_made_is_one_line(saved: Checkpoint, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InvalidProblem, match=r"^output: expected a place to write, got Not a directory"):
+        saved.save(tmp_path / "file" / "seed_0" / "x.safetensors")

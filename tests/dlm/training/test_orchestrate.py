@@ -1,3 +1,4 @@
+import os
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,6 +20,7 @@ from dlm.training.loop import Watch
 from dlm.training.orchestrate import DataSets, Run, chains, checkpoint_path, iterations_done, train
 from dlm.training.stage import Schedule, Stage
 from expert.errors import InvalidProblem
+from expert.files.output import claimed
 
 SMALL = NetworkSizes(channels=(2, 3, 4), latent=8, recurrent_layers=1, hidden_layers=1)
 PLAIN = {"stages": {"mdr": {"a": 1}, "cvx": {"b": 2}}, "seed": 3}
@@ -103,3 +105,16 @@ def test_iterations_of_earlier_runs_count_only_where_they_are_gone_on_from(run: 
     later = time.time() + 60
     assert iterations_done([one], later) == 0
     assert iterations_done([replace(one, resume=True)], later) == 2
+
+
+def test_two_trainings_of_one_stage_do_not_write_over_each_other(run: Callable[..., Run]) -> None:
+    one = run()
+    tasks = one.read()
+    with (
+        claimed(one.folder / "mdr"),
+        pytest.raises(InvalidProblem, match=f"mdr, which process {os.getpid()} is about to write"),
+    ):
+        one.train(one.stages[0], tasks)
+    assert not checkpoint_path(one.folder, "mdr").exists()
+    one.train(one.stages[0], tasks)
+    assert {p.name for p in one.folder.iterdir()} == {"mdr.safetensors", "tensorboard"}
