@@ -28,10 +28,11 @@ from expert.world.frame import Frame
 INNER_MARGIN = 1e-6
 """Inner shapes are eroded by this, so that neither rounding, nor parts that reach outside by their tolerance, nor the start
 tolerance can turn an escape into a cage."""
-TURN = 45 * 128
-"""Cell bounds are whole units of 1 / TURN of a full turn (0.0625 degrees) beyond the start orientation."""
-COARSEST = 128
-"""Width of a cell before refinement, in units: 8 degrees."""
+DEGREE = 256
+"""Cell bounds are whole units of 1/256 degree beyond the start orientation."""
+TURN = 360 * DEGREE
+COARSEST = 8 * DEGREE
+"""Width of a cell before refinement."""
 
 GRID = 1e-9
 """Overlays may move corners by this: far less than INNER_MARGIN and than the tolerance of the exact path check."""
@@ -40,7 +41,7 @@ Geometries = np.ndarray[tuple[int, ...], np.dtype[Any]]
 
 
 class Cell(NamedTuple):
-    """Orientations from `start` to `start + width` units; the start orientation alone is a cell of width 0."""
+    """Orientations from `start` to `start + width` units of 1 / DEGREE; the start orientation alone is a cell of width 0."""
 
     start: int
     width: int

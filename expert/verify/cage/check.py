@@ -28,7 +28,7 @@ def verify_cage(
     *,
     slack: float = 0.0,
     range_resolution: float = np.radians(0.5),
-    finest: float = np.radians(1 / 32),
+    finest: float = np.radians(1 / 512),
     cell_budget: int = CELL_BUDGET,
     within: tuple[float, float] | None = None,
 ) -> CageReport:
@@ -36,7 +36,7 @@ def verify_cage(
 
     slack: length [m] by which every finger may be elsewhere and a cage still be a cage; escapes are those of the fingers
     as given.  range_resolution: width [rad] to which the ends of a cage's rotation range are located.  finest: smallest
-    half-width [rad] of a cell (1/32 degree at least).  cell_budget: cells after which the answer is UNKNOWN.
+    half-width [rad] of a cell (1/512 degree at least).  cell_budget: cells after which the answer is UNKNOWN.
     within: orientations [rad], relative to the start, that the cage is expected to keep: looked at more closely where it
     seems to leave them.
     """

@@ -24,7 +24,6 @@ from expert.geometry.pose import Array, wrapped
 from expert.problems.cage import START_TOLERANCE
 from expert.problems.grasp import GraspProblem, GraspSolution
 from expert.verify.cage.check import verify_cage
-from expert.verify.cage.search import UNIT
 from expert.verify.grasp.claims import CLAIMED, cost_fault, gripper_fault
 from expert.verify.grasp.dead_ends import DeadEndEvent, dead_end_events
 from expert.verify.grasp.end_grasp import (
@@ -38,7 +37,7 @@ from expert.verify.grasp.end_grasp import (
 from expert.verify.grasp.event_kernel import TOUCH
 from expert.verify.grasp.finger_path import FingerPath
 from expert.verify.grasp.pockets import Pockets
-from expert.verify.grasp.reach_tube import COARSEST, Tube, reach_tube, settled_slab
+from expert.verify.grasp.reach_tube import COARSEST, FINEST, Tube, reach_tube, settled_slab
 from expert.verify.grasp.report import Cages, DeadEnd, DeadEnds, EndGrasp, GraspReport, Verdict
 from expert.verify.grasp.slab import uniform_ring
 from expert.verify.grasp.start_set import StartSet
@@ -46,6 +45,8 @@ from expert.world.values import readonly
 
 TIGHT, WIDE = np.radians([2, 10])
 """What can be reached may leave a knot's half-range by the one, or else the first one's by the other, before it leaks."""
+KNOT_RESOLUTION = np.radians(1 / 16)
+"""To which the orientations that can be reached at a knot are located."""
 NO_STARTS = np.empty((0, 2))
 ROUNDS = 3
 """What can be reached is computed with cells so often a quarter as wide, while that may yet exclude a dead end."""
@@ -164,7 +165,12 @@ class _Check:
         ranges = np.full((len(self.path.knots), 2), np.nan)
         for k in range(len(ranges)):
             half = float(self.problem.half_ranges[k])
-            report = verify_cage(self.path.arrangement(k), range_resolution=1.01 * UNIT, within=(-half, half))
+            report = verify_cage(
+                self.path.arrangement(k),
+                range_resolution=KNOT_RESOLUTION,
+                finest=KNOT_RESOLUTION / 2,
+                within=(-half, half),
+            )
             if report.rotation_range is not None:
                 ranges[k] = np.array(report.rotation_range) - self.problem.pose[2]
             elif report.verdict == "escapes":
@@ -260,7 +266,7 @@ class _Check:
     def _alone(self, tube: Tube) -> bool:
         """Whether the contacts exclude everything but the goal among what can be reached at the end."""
         end, before = self.path.last, tube.slabs[-1]
-        for ring in (before.ring, uniform_ring(1)):
+        for ring in (before.ring, uniform_ring(FINEST)):
             last = settled_slab(self.path, end, end, ring, before.reached, self.isolation.angle)
             if last is not None and self.isolation.holds_in(last.shift, *last.range):
                 return True

@@ -11,19 +11,22 @@ import shapely
 
 from expert.budget import Budget
 from expert.geometry.pose import Array
-from expert.verify.cage.cells import TURN, Cell
+from expert.verify.cage.cells import DEGREE, TURN, Cell
 from expert.verify.cage.search import UNIT
 from expert.verify.grasp.finger_path import FingerPath
 from expert.verify.grasp.pockets import NONE, Pockets
 from expert.verify.grasp.slab import Reached, Slab, SlabFlood, coarsened, uniform_ring
 
-COARSEST = 64
-"""Width of the widest cells that are of use, in units of the cage verifier: 4 degrees."""
+COARSEST, FINEST = 4 * DEGREE, DEGREE // 16
+"""Widths of the widest and of the narrowest cells that are of use."""
 LEAST_SLACK = 1e-5
 """Slabs in which fingers move by less than twice this relative length (at first ten times as far) are not halved."""
 ROOM = 0.1
 """What is reached in a slab may go beyond what its sources cover by this relative length."""
-NEAR_GOAL: Reached = {Cell(0, 1): [shapely.Point(0, 0)], Cell(TURN - 1, 1): [shapely.Point(0, 0)]}
+NEAR_GOAL: Reached = {
+    Cell(0, FINEST): [shapely.Point(0, 0)],
+    Cell(TURN - FINEST, FINEST): [shapely.Point(0, 0)],
+}
 
 
 @dataclass
@@ -111,7 +114,7 @@ def settled_slab(
     Overlays in plain doubles find the cells that are needed, and overlays on a grid confirm what they find.
     """
     flood = SlabFlood(path, low, high, ring, _around(sources))
-    finest = 1
+    finest = FINEST
     while finest * UNIT <= flood.slack and finest < COARSEST:
         finest *= 2
     while True:

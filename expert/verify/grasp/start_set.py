@@ -7,13 +7,13 @@ import numpy as np
 import shapely
 
 from expert.geometry.pose import Array
-from expert.verify.cage.cells import START, TURN, Cell, CellComplex
+from expert.verify.cage.cells import DEGREE, START, TURN, Cell, CellComplex
 from expert.verify.grasp.finger_path import FingerPath
 from expert.verify.grasp.slab import signed_bounds
 from expert.world.values import require
 
-WIDTH = 8
-"""Of a cell, in units of the cage verifier: half a degree."""
+WIDTH = DEGREE // 2
+"""Of a cell."""
 SEAM = 1e-6
 """Relative length by which a polygon of starts may touch what is not free."""
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from expert.geometry.pose import Array, rotation, to_body
 from expert.problems.cage import Arrangement
-from expert.verify.cage.cells import Cell, CellComplex, inner_piece, outer_piece
+from expert.verify.cage.cells import DEGREE, Cell, CellComplex, inner_piece, outer_piece
 from expert.world.frame import Frame
 from expert.world.named import named_shape
 from expert.world.shape import Shape
@@ -59,7 +59,7 @@ def test_the_gap_between_both_sides_closes_with_the_cell() -> None:
     assert gaps[2] < 0.2 * gaps[1]
 
 
-@pytest.mark.parametrize("width", [0, 1, 16, 128])
+@pytest.mark.parametrize("width", [0, 1, 16, 256, 2048])
 def test_components_enclose_and_are_enclosed_by_the_free_space(width: int) -> None:
     rng = np.random.default_rng(width)
     fingers = np.array([[-0.03, 0.0], [0.03, 0.01], [0.0, 0.06]])
@@ -96,7 +96,7 @@ def test_a_window_shows_the_same_free_space_and_what_leaves_it_is_unbounded(seed
     arrangement = Arrangement(shape=shape, pose=np.zeros(3), fingers=fingers)
     corner = rng.uniform(-1, 0, 2)
     window = shapely.box(*corner, *(corner + rng.uniform(0.2, 2, 2)))
-    cell = Cell(16 * int(rng.integers(360)), 16)
+    cell = Cell(DEGREE * int(rng.integers(360)), DEGREE)
     whole = CellComplex(arrangement, on_grid=on_grid).inner(cell)
     seen = CellComplex(arrangement, window=window, on_grid=on_grid).inner(cell)
     expected = shapely.intersection(shapely.union_all(whole.polygons), window)
