@@ -38,7 +38,7 @@ FILES = {
 }  # fmt: skip
 SHARES = {"contact_trajectory": 0.84, "cage": 0.14, "certified_grasp": 0.02}
 CONFIRMED = ("sound", "caged", "certified")
-TRUE_ALIKE = {("status", "feasible"), ("status", "uncertified")}
+TRUE_ALIKE = (["status", "feasible"], ["status", "uncertified"])
 """What says less than the truth."""
 
 
@@ -85,7 +85,7 @@ def is_lie(
     field: str, told: dict[str, Any], report: Any, solution: Solution, rng: np.random.Generator
 ) -> bool:
     """Whether what was confirmed is false, by other means where the change alone does not say so."""
-    if field in report.claimed or (field, told[field]) in TRUE_ALIKE:
+    if field in report.claimed or [field, told[field]] in TRUE_ALIKE:
         return False
     task, answer = solution.problem.task, solution.answer
     if field == "rotation_range":
