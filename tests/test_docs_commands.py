@@ -16,6 +16,7 @@ HYDRA = {
     "train.py": "train",
     "evaluate.py": "evaluate",
     "dlm.infer": "infer",
+    "dlm.control": "control",
 }
 """Commands that read their options from configs/<name>.yaml."""
 BARE = {"dlm.structured.weights"}
