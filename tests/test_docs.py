@@ -121,3 +121,17 @@ def test_snippets_are_python_and_import_what_exists(page: Path) -> None:
             n.func.id for n in ast.walk(tree) if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)
         ]
         assert [name for name in calls if not callable(names.get(name, print))] == []
+
+
+def test_pages_that_the_code_names_exist() -> None:
+    sources = [
+        *(
+            path
+            for room in ("expert", "datasets", "dlm", "configs", "examples")
+            for path in (ROOT / room).rglob("*.*")
+        )
+    ]
+    texts = [path.read_text() for path in sources if path.suffix in (".py", ".yaml")]
+    named = {page for text in texts for page in re.findall(r"\bdocs/[\w/-]+\.md", text)}
+    assert "docs/errata.md" in named
+    assert [page for page in sorted(named) if not (ROOT / page).exists()] == []

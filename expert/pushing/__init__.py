@@ -1,4 +1,4 @@
-"""Pushing a polygon with a disc: models of contact, tables of pushes, search in time.  See docs/pushing.md.
+"""Pushing a polygon with a disc: models of contact, tables of pushes, search in time.  See docs/theory/pushing.md.
 
 Lengths may be in any one unit; the world of Push-T is in pixels of its surface.
 """
