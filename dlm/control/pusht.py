@@ -25,8 +25,6 @@ SIDE = 512.0
 """Commands lie in the square from 0 to this."""
 WALLS = (8.0, 503.0)
 """Free side of the walls, one pixel from them: contact with a wall is not modelled."""
-COVERAGE = 0.95
-"""Success: more than this fraction of the goal is covered."""
 
 
 class Settings(NamedTuple):
