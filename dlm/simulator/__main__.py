@@ -67,7 +67,7 @@ def _run(options: argparse.Namespace) -> int:
     result: dict[str, Any] = {
         "simulator": _summary(record.poses, task),
         "loss_cm2": record.loss,
-        "inexact_steps": record.inexact,
+        "steps_with_several_solutions": record.several,
     }
     if options.mujoco:
         other = replay_in_mujoco(task, plan.positions, plan.forces, settings)

@@ -11,7 +11,7 @@ from numba import njit
 
 from dlm.simulator import support
 from dlm.simulator.contact import FACET, WALL
-from dlm.simulator.lcp import OPEN, SLIP_PLUS, STICK, Problem, reduced_system, solve_linear
+from dlm.simulator.problem import OPEN, SLIP_PLUS, STICK, Problem, reduced_system, solve_linear
 from dlm.simulator.step import (
     CORRECTION,
     FASTEST_CORRECTION,
@@ -19,9 +19,12 @@ from dlm.simulator.step import (
     Work,
     assemble_problem,
     bias,
+    coasts,
     contact_scale,
+    finger_mobility,
     softness,
     solve_step,
+    spring_rates,
     support_mobility,
 )
 from dlm.simulator.world import State, World, vertex_arm
@@ -69,13 +72,14 @@ def bias_slope(gap: float, h: float, kappa: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def adjoint_step(
-    world: World, state: State, command: np.ndarray, bar: State, command_bar: np.ndarray, work: Work
+    world: World, state: State, commands: np.ndarray, bar: State, command_bar: np.ndarray, work: Work
 ) -> None:
-    """Turn the adjoints `bar` of the state after the step into those before it, in place; command_bar receives the command's."""
-    n, _ = solve_step(world, state, command, work)
+    """Turn the adjoints `bar` of the state after the step into those before it, in place; add to the commands' (2, C, 2)."""
+    n, _ = solve_step(world, state, commands, work)
+    early = 0.5 * world.h if coasts(n, state, work) else 0.0
     if world.support > 0:
         _linearise_support(n, world, state, work)
-    end, ends = bar.velocity + world.h * bar.pose, world.h * bar.fingers
+    end, ends = bar.velocity + (world.h - early) * bar.pose, world.h * bar.fingers
     w = row_multipliers(n, work.problem, impulse_adjoint(n, world, end, ends, work))
     contacts, rows, _, _ = work.problem
     for r in range(2 * n):
@@ -87,17 +91,20 @@ def adjoint_step(
             ends[f, 0] += w[r] * row.x
             ends[f, 1] += w[r] * row.y
     back = Back(work.mobility @ end, ends, w)
+    pose_bar = bar.pose.copy()
     for i in range(n):
         if rows[2 * i].P != 0 or w[2 * i] != 0:
             _adjoint_contact(i, world, state, back, bar, work)
     if world.support > 0:
         bar.pose[2] += support.turning_slope(world, state.pose, back.z, work.velocity)
     for d in range(3):
-        bar.velocity[d] = (world.inertia if d == 2 else world.mass) * back.z[d]
+        bar.velocity[d] = (world.inertia if d == 2 else world.mass) * back.z[d] + early * pose_bar[d]
+    follow, lead = spring_rates(world)
     for c in range(len(ends)):
         for d in range(2):
-            command_bar[c, d] = world.follow * ends[c, d]
-            bar.fingers[c, d] -= world.follow * ends[c, d]
+            command_bar[1, c, d] += (follow + lead) * ends[c, d]
+            command_bar[0, c, d] -= lead * ends[c, d]
+            bar.fingers[c, d] -= follow * ends[c, d]
 
 
 @njit(cache=True, error_model="numpy")
@@ -108,20 +115,20 @@ def _linearise_support(n: int, world: World, state: State, work: Work) -> None:
     assemble_problem(n, world, work)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def impulse_adjoint(n: int, world: World, end: np.ndarray, ends: np.ndarray, work: Work) -> np.ndarray:
     """Adjoints (2 n,) of the impulses, given those of the velocities of object (3,) and fingers (C, 2)."""
-    weighted, out = work.mobility @ end, np.zeros(2 * n)
+    weighted, out, give = work.mobility @ end, np.zeros(2 * n), finger_mobility(world)
     contacts, rows, _, _ = work.problem
     for r in range(2 * n):
         row, f = rows[r], contacts[r // 2].finger
         out[r] = row.x * weighted[0] + row.y * weighted[1] + row.turn * weighted[2]
         if f >= 0:
-            out[r] -= world.give * (row.x * ends[f, 0] + row.y * ends[f, 1])
+            out[r] -= give * (row.x * ends[f, 0] + row.y * ends[f, 1])
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def row_multipliers(n: int, problem: Problem, adjoint: np.ndarray) -> np.ndarray:
     """w (2 n,) with B^T w = adjoint of the impulses, for the equations of the active set, and 0 on all other rows."""
     contacts, rows = problem.contacts, problem.rows
@@ -151,7 +158,7 @@ def row_multipliers(n: int, problem: Problem, adjoint: np.ndarray) -> np.ndarray
     return w
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _adjoint_contact(i: int, world: World, state: State, back: Back, bar: State, work: Work) -> None:
     """Adjoint of contact i's rows, bias and compliance, then of its geometry."""
     contacts, rows, _, _ = work.problem
@@ -159,7 +166,7 @@ def _adjoint_contact(i: int, world: World, state: State, back: Back, bar: State,
     z, ends, w = back
     contact = contacts[i]
     f, gap = contact.finger, contact.gap
-    give = world.give if f >= 0 else 0.0
+    give = finger_mobility(world) if f >= 0 else 0.0
     soft, slope = softness(gap, world.kappa, world.regularization), softness_slope(gap, world.kappa)
     ax, ay = contact.x - state.pose[0], contact.y - state.pose[1]
     nx_bar, ny_bar, ax_bar, ay_bar = 0.0, 0.0, 0.0, 0.0

@@ -16,8 +16,8 @@ CONTACT = np.dtype(
     + [(name, "f8") for name in ("nx", "ny", "x", "y", "gap", "friction")]
 )
 """kind; finger or -1; feature: facet, vertex or a wall's vertex; wall or -1; state: see `lcp`; n; point; gap; friction."""
-WALL_POINTS = 4
-"""At most this many vertices touch one wall."""
+COLLINEAR, SAME_PLACE = 1e-9, 1e-12
+"""Slopes that differ by less are one line; vertices as close along a wall are one place [m]."""
 REACH = 2e-3
 """Rigid contacts that a step would leave at least this far apart are not handed to the LCP [m]."""
 LEAST_ACTIVATION = 1e-6
@@ -141,7 +141,7 @@ def _add_finger(world: World, now: Moment, c: int, feature: tuple[int, int], out
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _add_wall(world: World, now: Moment, w: int, out: np.ndarray, n: int) -> int:
-    """The lowest vertices over wall w."""
+    """The vertices that may touch wall w first, however the object moves: the lower convex hull of those near it."""
     wall, base = world.walls[w], n
     nx, ny = wall.nx, wall.ny
     for k in range(len(world.facets)):
@@ -152,18 +152,37 @@ def _add_wall(world: World, now: Moment, w: int, out: np.ndarray, n: int) -> int
         )
         if not _acts(gap, -world.h * opening, world.kappa):
             continue
-        at = n
-        if n - base == WALL_POINTS:
-            at = base
-            for i in range(base + 1, n):
-                if out[i].gap > out[at].gap:
-                    at = i
-            if out[at].gap <= gap:
-                continue
-        else:
-            n += 1
-        contact = out[at]
+        contact = out[n]
         contact.kind, contact.finger, contact.feature, contact.wall = WALL, -1, k, w
         contact.nx, contact.ny, contact.x, contact.y = nx, ny, now.pose[0] + rx, now.pose[1] + ry
         contact.gap, contact.friction = gap, wall.friction
-    return n
+        n += 1
+    return n if n - base <= 2 else _lower_hull(out, base, n)
+
+
+@njit(cache=True, error_model="numpy")
+def _lower_hull(out: np.ndarray, base: int, n: int) -> int:
+    """Keep, of the contacts base to n with one wall, those that are not above a line between two others; the new number.
+
+    The others cannot touch before these do: gaps change linearly along the wall in a small motion.  Collinear vertices
+    between two others go too.
+    """
+    redundant = np.zeros(n - base, np.bool_)
+    for i in range(base, n):
+        left, right = -np.inf, np.inf  # steepest slopes from one side and to the other
+        for j in range(base, n):
+            along = (out[j].x - out[i].x) * out[i].ny - (out[j].y - out[i].y) * out[i].nx
+            rise = out[j].gap - out[i].gap
+            if abs(along) < SAME_PLACE:
+                redundant[i - base] |= rise < 0 or (rise == 0 and j < i)
+            elif along < 0:
+                left = max(left, rise / along)
+            else:
+                right = min(right, rise / along)
+        redundant[i - base] |= left >= right - COLLINEAR
+    kept = base
+    for i in range(base, n):
+        if not redundant[i - base]:
+            out[kept] = out[i]
+            kept += 1
+    return kept

@@ -5,6 +5,7 @@ from numba import njit
 
 from dlm.simulator.commands import Commands, command
 from dlm.simulator.rollout import (
+    DONE,
     Item,
     Plans,
     Run,
@@ -12,7 +13,7 @@ from dlm.simulator.rollout import (
     advance,
     execute,
     item_of,
-    run_for,
+    run_of_plans,
     start_motion,
     table_of,
 )
@@ -29,13 +30,16 @@ def difference_batch(
     """Gradients as `implicit_batch` gives them: by a step [m] in positions, step * stiffness [N] in forces (the same commands)."""
     B, T, C = plans.loaded.shape
     gradient = np.zeros((B, 2, T, C, 2))
-    base, moved = run_for(scenes, plans, settings), run_for(scenes, plans, settings)
+    base, moved = run_of_plans(scenes, plans, settings), run_of_plans(scenes, plans, settings)
     for b in range(B):
         item = item_of(scenes, plans, b, settings)
         if not acceptable(item):
             continue
         table = table_of(item, settings)
-        if execute(item, table, base):
+        if execute(item, table, base) == DONE:
+            moved.motion.parts[:] = (
+                base.motion.parts
+            )  # cutting steps elsewhere would look like a change of the motion
             _differentiate(item, table, settings, adjoint[b], (base, moved), gradient[b])
     return gradient[:, POSITION].copy(), gradient[:, FORCE].copy()
 
@@ -73,10 +77,10 @@ def _change(
 ) -> float:
     """Change of the knot poses along their adjoint (T, 3) for an item of which the plan of finger c was changed."""
     base, moved = runs
-    command(table, item.positions, item.forces, item.world.stiffness, moved.commands)
+    command(table, item.positions, item.forces, item.world.stiffness, moved.motion.commands)
     first = _restart(item, table, c, base, moved)
-    if first < len(moved.commands) - 1:
-        advance(item.world, moved, first)
+    if first < len(moved.motion.parts):
+        advance(item.world, moved, first, False)
     total = 0.0
     for k in range(first // substeps + 1, len(adjoint)):
         for e in range(3):
@@ -105,15 +109,15 @@ def _restart(item: Item, table: Commands, c: int, base: Run, moved: Run) -> int:
 
     The number of substeps where they never do, because the finger is away from the object while they differ.
     """
-    S, old, new = len(base.commands) - 1, base.motion, moved.motion
+    S, old, new = len(base.motion.parts), base.motion, moved.motion
     start_motion(item, table, new)
     first, last = 0, S
-    if (new.fingers[0] == old.fingers[0]).all():
-        while first < S and (base.commands[first + 1] == moved.commands[first + 1]).all():
+    if (new.fingers[0] == old.fingers[0]).all() and (new.commands[0] == old.commands[0]).all():
+        while first < S and (old.commands[first + 1] == new.commands[first + 1]).all():
             first += 1
-    while item.world.damping == 0 and last > first and (base.commands[last] == moved.commands[last]).all():
+    while last > first and (old.commands[last] == new.commands[last]).all():
         last -= 1
-    # A finger without mass and damper forgets within a step where it has been.
+    # A free finger, which has no mass, goes with its command: nothing is left of the change where that has none.
     if not old.near[first : min(last + 1, S), c].any():
         return S
     if first > 0:

@@ -7,9 +7,10 @@ import torch
 
 from dlm.simulator.differences import difference_batch
 from dlm.simulator.implicit import implicit_batch
-from dlm.simulator.rollout import Plans, execute_batch
+from dlm.simulator.rollout import DONE, UNSOLVED, UNSOLVED_STEP, Plans, execute_batch
 from dlm.simulator.scene import SceneBatch
 from dlm.simulator.settings import SimulatorSettings
+from expert.errors import SolverFailed
 from expert.world.values import require
 
 
@@ -26,14 +27,13 @@ class _Rollout(torch.autograd.Function):
         start: np.ndarray,
         settings: SimulatorSettings,
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Poses (B, T, 3), float64, and status (B,)."""
+        """Poses (B, T, 3), float64, and how each motion ended (B,)."""
         plans = Plans(_array(positions), _array(forces), loaded, start)
-        poses, ok = execute_batch(batch.arrays, plans, settings.numbers)
+        poses, ends = (torch.from_numpy(x) for x in execute_batch(batch.arrays, plans, settings.numbers))
         ctx.problem = batch, plans, settings
         ctx.dtypes = positions.dtype, forces.dtype
-        ok_tensor = torch.from_numpy(ok)
-        ctx.mark_non_differentiable(ok_tensor)
-        return torch.from_numpy(poses), ok_tensor
+        ctx.mark_non_differentiable(ends)
+        return poses, ends
 
     @staticmethod
     def backward(ctx: Any, *adjoints: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
@@ -59,9 +59,13 @@ def rollout(
 
     positions, forces: (B, T, C, 2) [m], [N on the object], world frame.  contact (B, T, C): the finger pushes from this
     knot on; by default where its force is that of a push (`SceneBatch.loaded`).  start (B, 3): first poses, by default the
-    desired ones.  Differentiable in positions and forces.  See `rollout_with_status` for plans that are not finite.
+    desired ones.  Differentiable in positions and forces.  Raises SolverFailed where rounding made a contact problem
+    unsolvable; see `rollout_with_status` to go on, and for plans that are not finite.
     """
-    return rollout_with_status(batch, positions, forces, settings, contact, start)[0]
+    poses, ends = _rollout(batch, positions, forces, settings, contact, start)
+    if (ends == UNSOLVED).any():
+        raise SolverFailed(f"{UNSOLVED_STEP}: scenes {(ends == UNSOLVED).nonzero().flatten().tolist()}")
+    return poses
 
 
 def rollout_with_status(
@@ -72,10 +76,22 @@ def rollout_with_status(
     contact: torch.Tensor | np.ndarray | None = None,
     start: np.ndarray | None = None,
 ) -> tuple[torch.Tensor, torch.Tensor]:
-    """`rollout` and a status (B,): False where the plan is not finite or numbers overflowed.
+    """`rollout` and a status (B,): False where the plan is not finite, numbers overflowed, or a contact problem was unsolvable.
 
-    Such an item keeps its last finite pose, has no gradient and leaves the others alone.
+    Such an item keeps its last good pose, has no gradient and leaves the others alone.
     """
+    poses, ends = _rollout(batch, positions, forces, settings, contact, start)
+    return poses, ends == DONE
+
+
+def _rollout(
+    batch: SceneBatch,
+    positions: torch.Tensor,
+    forces: torch.Tensor,
+    settings: SimulatorSettings | None,
+    contact: torch.Tensor | np.ndarray | None,
+    start: np.ndarray | None,
+) -> tuple[torch.Tensor, torch.Tensor]:
     settings = settings or SimulatorSettings()
     B, T = len(batch), batch.steps
     fits = positions.ndim == 4 and positions.shape[:2] == (B, T) and positions.shape[3] == 2
@@ -86,8 +102,7 @@ def rollout_with_status(
     first = batch.desired[:, 0].copy() if start is None else np.array(start, dtype=float)
     require(first.shape == (B, 3), "start", f"shape ({B}, 3)", first.shape)
     scenes = batch.without_friction() if settings.frictionless else batch
-    poses, ok = _Rollout.apply(positions, forces, scenes, np.ascontiguousarray(flags), first, settings)
-    return poses, ok
+    return _Rollout.apply(positions, forces, scenes, np.ascontiguousarray(flags), first, settings)
 
 
 def _array(tensor: torch.Tensor) -> np.ndarray:

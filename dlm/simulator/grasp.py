@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from dlm.simulator.mujoco import MujocoReplay, command_model, replay_model
-from dlm.simulator.rollout import Run, advance, motion_for
+from dlm.simulator.replay import follow
+from dlm.simulator.rollout import run_for
 from dlm.simulator.scene import Scene, SceneBatch
 from dlm.simulator.settings import SimulatorSettings
-from dlm.simulator.step import work_for
 from dlm.simulator.world import world_of
 from expert.geometry.pose import Array, moved_origin
 from expert.problems.grasp import GraspProblem
@@ -45,19 +45,22 @@ def replay_grasp(
 ) -> Array:
     """Object poses (M, K, 3) at the knots of finger paths (K, N, 2) [m], from start poses (M, 3).
 
-    friction: at the fingers.  The last pose is held where numbers overflow.
+    friction: at the fingers.  The last pose is held where numbers overflow.  Raises SolverFailed where rounding made a
+    contact problem unsolvable.
     """
     slow = slow or Slow()
     scene, centroid = _scene(problem, len(path), friction, slow)
     commands = _commands(readonly(path, (None, None, 2), "path"), slow.substeps)
     batch = SceneBatch.of([scene])
-    world, fingers = world_of(batch.arrays, 0, slow.settings.numbers), path.shape[1]
-    run = Run(motion_for(len(commands), fingers), commands, work_for(fingers, batch.arrays.walls.shape[1]))
+    world = world_of(batch.arrays, 0, slow.settings.numbers)
+    run = run_for(batch.arrays, len(commands), path.shape[1])
+    motion = run.motion
+    motion.commands[:] = commands
     poses = np.empty((len(starts), len(path), 3))
     for m, start in enumerate(moved_origin(readonly(starts, (None, 3), "starts"), centroid)):
-        run.motion.poses[0], run.motion.fingers[0], run.motion.velocities[0] = start, commands[0], 0
-        advance(world, run, 0)
-        poses[m] = run.motion.poses[:: slow.substeps]
+        motion.poses[0], motion.fingers[0], motion.velocities[0] = start, commands[0], 0
+        follow(world, run)
+        poses[m] = motion.poses[:: slow.substeps]
     return moved_origin(poses, -centroid)
 
 

@@ -5,9 +5,21 @@ from numba import njit
 
 from dlm.simulator.adjoint import adjoint_step
 from dlm.simulator.commands import pull_back
-from dlm.simulator.rollout import Item, Plans, Run, acceptable, execute, item_of, run_for, table_of
+from dlm.simulator.rollout import (
+    DONE,
+    Item,
+    Plans,
+    Run,
+    acceptable,
+    execute,
+    item_of,
+    load_parts,
+    move,
+    run_of_plans,
+    table_of,
+)
 from dlm.simulator.scene import SceneArrays
-from dlm.simulator.world import State
+from dlm.simulator.world import State, World
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -16,14 +28,14 @@ def implicit_batch(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Gradients with respect to positions and forces (B, T, C, 2), given that of the knot poses (B, T, 3)."""
     d_positions, d_forces = np.zeros_like(plans.positions), np.zeros_like(plans.forces)
-    run = run_for(scenes, plans, settings)
-    command_bar = np.zeros_like(run.commands)
+    run = run_of_plans(scenes, plans, settings)
+    command_bar = np.zeros_like(run.motion.commands)
     for b in range(len(adjoint)):
         item = item_of(scenes, plans, b, settings)
         if not acceptable(item):
             continue
         table = table_of(item, settings)
-        if not execute(item, table, run):
+        if execute(item, table, run) != DONE:
             continue
         first = _sweep_back(item, run, adjoint[b], settings.substeps, command_bar)
         pull_back(table, command_bar, item.world.stiffness, d_positions[b], d_forces[b])
@@ -38,12 +50,31 @@ def _sweep_back(
     item: Item, run: Run, adjoint: np.ndarray, substeps: int, command_bar: np.ndarray
 ) -> np.ndarray:
     """Adjoints of the commands (S + 1, C, 2), and of the fingers' first positions (1, C, 2)."""
-    motion, commands, work = run
-    bar = State(np.zeros(3), np.zeros(3), np.zeros(commands.shape[1:]))
-    command_bar[0] = 0
-    for i in range(len(commands) - 1, 0, -1):
-        if i % substeps == 0:
-            bar.pose[:] += adjoint[i // substeps]
-        before = State(motion.poses[i - 1], motion.velocities[i - 1], motion.fingers[i - 1])
-        adjoint_step(item.world, before, commands[i], bar, command_bar[i], work)
-    return bar.fingers.reshape((1, *commands.shape[1:]))
+    motion, world = run.motion, item.world
+    bar = State(np.zeros(3), np.zeros(3), np.zeros_like(motion.fingers[0]))
+    command_bar[:] = 0
+    for i in range(len(motion.parts) - 1, -1, -1):
+        if (i + 1) % substeps == 0:
+            bar.pose[:] += adjoint[(i + 1) // substeps]
+        if motion.parts[i] == 1:
+            before = State(motion.poses[i], motion.velocities[i], motion.fingers[i])
+            adjoint_step(world, before, motion.commands[i : i + 2], bar, command_bar[i : i + 2], run.work)
+        else:
+            _sweep_back_parts(world, run, i, bar, command_bar)
+    return bar.fingers.reshape((1, *motion.fingers.shape[1:]))
+
+
+@njit(cache=True, error_model="numpy")
+def _sweep_back_parts(world: World, run: Run, i: int, bar: State, command_bar: np.ndarray) -> None:
+    """The same for a step that was cut: its parts once more, and then back."""
+    motion, fine, work = run
+    parts, finer = motion.parts[i], load_parts(world, run, i)
+    for j in range(parts - 1):
+        move(finer, fine, j, motion.near[i], work)
+    fine_bar = np.zeros((parts + 1, *motion.fingers.shape[1:]))
+    for j in range(parts - 1, -1, -1):
+        before = State(fine.poses[j], fine.velocities[j], fine.fingers[j])
+        adjoint_step(finer, before, fine.commands[j : j + 2], bar, fine_bar[j : j + 2], work)
+    for j in range(parts + 1):
+        command_bar[i] += (1 - j / parts) * fine_bar[j]
+        command_bar[i + 1] += (j / parts) * fine_bar[j]

@@ -3,8 +3,9 @@
 import numpy as np
 from numba import njit
 
-from dlm.simulator.lcp import relative_velocity
-from dlm.simulator.rollout import Run
+from dlm.simulator.modes import MOST_CONTACTS, has_other_solutions
+from dlm.simulator.problem import relative_velocity
+from dlm.simulator.rollout import Motion, Run, load_parts, move
 from dlm.simulator.step import Work, solve_step
 from dlm.simulator.world import State, World
 
@@ -13,35 +14,54 @@ TRACE = np.dtype(
     + [(name, "f8") for name in ("x", "y", "fx", "fy", "gap", "slip")]
 )
 """A contact that carried force: substep, finger or -1, wall or -1, point, force on the object, gap before, slip after."""
-LAWS = np.dtype([("momentum", "f8"), ("cone", "f8")])
-"""Largest violation of Newton's law, and of friction cones and complementarity [N]."""
+LAWS = np.dtype([("momentum", "f8"), ("cone", "f8"), ("several", "i8"), ("unchecked", "i8")])
+"""Largest violation of Newton's law, and of friction cones and complementarity [N]; steps whose contact problem has other
+solutions too, and steps with too many contacts to look for them."""
 
 
 @njit(cache=True, error_model="numpy")
 def trace(world: World, run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Contacts (n,) of TRACE, residuals (1,) of LAWS, and work of the fingers (S,), of a motion that was run."""
-    motion, commands, work = run
-    S = len(commands) - 1
+    """Contacts (n,) of TRACE, (1,) of LAWS, and work of the fingers (S,), of a motion that was run.
+
+    Of a substep that was cut into parts, the contacts of the last one.
+    """
+    motion, fine, work = run
+    S = len(motion.parts)
     out, laws = np.zeros(S * len(work.problem.contacts), TRACE), np.zeros(1, LAWS)
     finger_work = np.zeros(S)
     count = 0
     for i in range(S):
-        before = State(motion.poses[i], motion.velocities[i], motion.fingers[i])
-        n, _ = solve_step(world, before, commands[i + 1], work)
-        law = laws[0]
-        law.momentum = max(law.momentum, _momentum(n, world, before, commands[i + 1], work))
-        for k in range(n):
-            law.cone = max(law.cone, _cone(n, k, world, work))
-            if work.problem.rows[2 * k].P != 0 or work.problem.rows[2 * k + 1].P != 0:
-                out[count].step = i
-                finger_work[i] += _note_contact(k, world, before, work, out[count])
-                count += 1
+        finer = load_parts(world, run, i)
+        for j in range(motion.parts[i]):
+            move(finer, fine, j, motion.near[i], work)
+            n, last = _check(finer, fine, j, work, laws[0]), j == motion.parts[i] - 1
+            for k in range(n):
+                if work.problem.rows[2 * k].P != 0 or work.problem.rows[2 * k + 1].P != 0:
+                    out[count].step = i
+                    finger_work[i] += _note_contact(k, finer, fine.velocities[j], work, out[count])
+                    count += last
     return out[:count], laws, finger_work
 
 
 @njit(cache=True, error_model="numpy")
-def _note_contact(k: int, world: World, before: State, work: Work, out: np.record) -> float:
-    """Fill the record of contact k; its finger's work on the object during the step."""
+def _check(world: World, motion: Motion, j: int, work: Work, laws: np.record) -> int:
+    """Solve step j once more and hold it against the laws; the number of contacts."""
+    before = State(motion.poses[j], motion.velocities[j], motion.fingers[j])
+    commands = motion.commands[j : j + 2]
+    n, _ = solve_step(world, before, commands, work)
+    laws.momentum = max(laws.momentum, _momentum(n, world, before, commands, work))
+    for k in range(n):
+        laws.cone = max(laws.cone, _cone(n, k, world, work))
+    if n > MOST_CONTACTS:
+        laws.unchecked += 1
+    elif n > 0 and has_other_solutions(n, work.problem):
+        laws.several += 1
+    return n
+
+
+@njit(cache=True, error_model="numpy")
+def _note_contact(k: int, world: World, before: np.ndarray, work: Work, out: np.record) -> float:
+    """Fill the record of contact k; its finger's work on the object, whose velocity was `before`, during the step."""
     contact, f = work.problem.contacts[k], work.problem.contacts[k].finger
     normal, tangent = work.problem.rows[2 * k], work.problem.rows[2 * k + 1]
     out.finger, out.wall, out.gap, out.x, out.y = f, contact.wall, contact.gap, contact.x, contact.y
@@ -53,12 +73,12 @@ def _note_contact(k: int, world: World, before: State, work: Work, out: np.recor
         return 0.0
     out.slip -= tangent.x * work.finger_velocity[f, 0] + tangent.y * work.finger_velocity[f, 1]
     turn = (normal.P * normal.turn + tangent.P * tangent.turn) / world.h
-    mid = 0.5 * (before.velocity + after)
+    mid = 0.5 * (before + after)
     return world.h * (out.fx * mid[0] + out.fy * mid[1] + turn * mid[2])
 
 
 @njit(cache=True, error_model="numpy")
-def _momentum(n: int, world: World, before: State, command: np.ndarray, work: Work) -> float:
+def _momentum(n: int, world: World, before: State, commands: np.ndarray, work: Work) -> float:
     """Violation of Newton's law for object (support plane aside) and fingers, moments over the radius of gyration [N]."""
     h, v, after, p = world.h, before.velocity, work.velocity, before.fingers
     net = np.array([after[0] - v[0], after[1] - v[1] + h * world.gravity, after[2] - v[2]])
@@ -66,8 +86,10 @@ def _momentum(n: int, world: World, before: State, command: np.ndarray, work: Wo
     spring = np.zeros_like(p)
     for c in range(len(p)):
         for d in range(2):
-            drop = command[c, d] - p[c, d] - h * work.finger_velocity[c, d]
-            spring[c, d] = world.stiffness * drop - world.damping * work.finger_velocity[c, d]
+            u, target, w = commands[0, c, d], commands[1, c, d], work.finger_velocity[c, d]
+            spring[c, d] = world.stiffness * (target - p[c, d] - h * w) + world.damping * (
+                (target - u) / h - w
+            )
     for k in range(n):
         contact, normal, tangent = (
             work.problem.contacts[k],
@@ -81,7 +103,7 @@ def _momentum(n: int, world: World, before: State, command: np.ndarray, work: Wo
         if contact.finger >= 0:
             spring[contact.finger, 0] -= fx / h
             spring[contact.finger, 1] -= fy / h
-    net[2] /= np.sqrt(world.inertia / world.mass)
+    net[2] /= world.gyration
     largest = np.abs(spring).max() if len(p) > 0 else 0.0
     return largest if world.support > 0 else max(largest, np.abs(net).max() / h)
 

@@ -9,20 +9,23 @@ from dlm.simulator.commands import command
 from dlm.simulator.laws import trace
 from dlm.simulator.path import desired_motion
 from dlm.simulator.rollout import (
+    DONE,
+    UNSOLVED,
+    UNSOLVED_STEP,
     Motion,
     Plans,
     Run,
     advance,
     item_of,
-    motion_for,
     run_for,
+    run_of_plans,
     start_motion,
     table_of,
 )
 from dlm.simulator.scene import Scene, SceneBatch
 from dlm.simulator.settings import SimulatorSettings
-from dlm.simulator.step import work_for
 from dlm.simulator.world import World, world_of
+from expert.errors import SolverFailed
 from expert.geometry.pose import Array
 from expert.problems.contact import ContactTask
 from expert.world.values import readonly, require
@@ -52,8 +55,9 @@ class Replay:
     poses (T, 3) at the knots; substep_poses, substep_velocities, desired (S + 1, 3); fingers, commands (S + 1, C, 2) [m].
     energy (S + 1,): kinetic plus potential energy of the object [J]; work (S,): of the fingers on it per substep [J].
     momentum_residual, cone_residual: largest violation of Newton's law [N, with moments over the object's size] and of
-    friction cones and complementarity [N]; inexact: substeps whose contact problem was only approximated.
-    ok: False where the motion overflowed and was held.
+    friction cones and complementarity [N].  several: steps whose contact problem has other solutions too (Painleve); this
+    is looked for with up to four contacts, and not in `unchecked` steps.  ok: False where numbers overflowed and the motion
+    was held.
     """
 
     poses: Array
@@ -67,7 +71,8 @@ class Replay:
     work: Array
     momentum_residual: float
     cone_residual: float
-    inexact: int
+    several: int
+    unchecked: int
     ok: bool
 
     @property
@@ -95,7 +100,8 @@ def replay(
     """Execute one plan, positions [m] and forces [N] (T, C, 2), and record it.
 
     contact (T, C): the finger pushes from this knot on; by default where its force is not zero.  start (3,): the object's
-    first pose, by default the desired one.  Raises InvalidProblem for plans of a wrong shape or with nan.
+    first pose, by default the desired one.  Raises InvalidProblem for plans of a wrong shape or with nan, SolverFailed where rounding
+    made a contact problem unsolvable.
     """
     settings = settings or SimulatorSettings()
     commands, fingers = planned_commands(task, positions, forces, settings, contact=contact)
@@ -123,11 +129,11 @@ def planned_commands(
     require(flags.shape == p.shape[:2], "contact", f"shape {p.shape[:2]}", flags.shape)
     plans = Plans(p[None], f[None], np.ascontiguousarray(flags[None]), batch.desired[:, 0].copy())
     numbers = settings.numbers
-    run, item = run_for(batch.arrays, plans, numbers), item_of(batch.arrays, plans, 0, numbers)
+    run, item = run_of_plans(batch.arrays, plans, numbers), item_of(batch.arrays, plans, 0, numbers)
     table = table_of(item, numbers)
-    command(table, item.positions, item.forces, item.world.stiffness, run.commands)
+    command(table, item.positions, item.forces, item.world.stiffness, run.motion.commands)
     start_motion(item, table, run.motion)
-    return run.commands, run.motion.fingers[0]
+    return run.motion.commands, run.motion.fingers[0]
 
 
 def simulate(
@@ -146,11 +152,12 @@ def simulate(
     """
     scenes = (batch.without_friction() if settings.frictionless else batch).arrays
     world = world_of(scenes, 0, settings.numbers)
-    motion, work = motion_for(*commands.shape[:2]), work_for(commands.shape[1], scenes.walls.shape[1])
-    run = Run(motion, np.ascontiguousarray(commands, dtype=float), work)
+    run = run_for(scenes, *commands.shape[:2])
+    motion = run.motion
+    motion.commands[:] = commands
     motion.poses[0], motion.fingers[0] = start, fingers
     motion.velocities[0] = 0 if velocity is None else velocity
-    ok = advance(world, run, 0)
+    ok = follow(world, run)
     contacts, laws, finger_work = trace(world, run)
     q, v = motion.poses, motion.velocities
     return Replay(
@@ -165,9 +172,21 @@ def simulate(
         work=finger_work,
         momentum_residual=float(laws["momentum"][0]),
         cone_residual=float(laws["cone"][0]),
-        inexact=int((~motion.exact).sum()),
-        ok=bool(ok),
+        several=int(laws["several"][0]),
+        unchecked=int(laws["unchecked"][0]),
+        ok=ok,
     )
+
+
+def follow(world: World, run: Run) -> bool:
+    """Run a motion from its first state under its commands; whether numbers stayed finite.
+
+    Raises SolverFailed where rounding made a contact problem unsolvable.
+    """
+    end = advance(world, run, 0, True)
+    if end == UNSOLVED:
+        raise SolverFailed(UNSOLVED_STEP)
+    return end == DONE
 
 
 def _energy(world: World, motion: Motion) -> Array:

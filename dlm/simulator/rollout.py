@@ -10,9 +10,18 @@ from numba import njit
 
 from dlm.simulator.commands import Commands, command
 from dlm.simulator.execution import plan_commands
+from dlm.simulator.problem import ROWS
 from dlm.simulator.scene import SceneArrays
-from dlm.simulator.step import Work, solve_step, work_for
-from dlm.simulator.world import State, World, world_of
+from dlm.simulator.step import Work, coasts, solve_step, work_for
+from dlm.simulator.world import State, World, with_step, world_of
+
+DONE, OVERFLOWN, UNSOLVED = 0, 1, 2
+"""How a motion ends: as planned, with numbers that are not finite, with a contact problem that rounding made unsolvable."""
+UNSOLVED_STEP = "simulation: the contact problem of a step was not solved"
+HELD = 0.1
+"""Share of a step's error that stays where contacts hold all three freedoms of the object, or its support brakes them."""
+MOST_PARTS = 32
+"""Of one step."""
 
 
 class Plans(NamedTuple):
@@ -25,23 +34,25 @@ class Plans(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """States at every substep: poses and velocities (S + 1, 3), fingers (S + 1, C, 2).
+    """States at samples in time: poses and velocities (S + 1, 3), fingers and their commands (S + 1, C, 2).
 
-    exact (S,): the contact problem was solved exactly; near (S, C): the finger was near enough to take part in it.
+    Of the steps between them: near (S, C): the finger was near enough to take part in the contact problem; parts (S,): into
+    how many the step was cut.
     """
 
     poses: np.ndarray
     velocities: np.ndarray
     fingers: np.ndarray
-    exact: np.ndarray
+    commands: np.ndarray
     near: np.ndarray
+    parts: np.ndarray
 
 
 class Run(NamedTuple):
-    """Memory of one scene's execution: its motion, the commands (S + 1, C, 2) that it follows, and scratch."""
+    """Memory of one scene's execution: its motion at the substeps, at the parts of one of them, and scratch."""
 
     motion: Motion
-    commands: np.ndarray
+    fine: Motion
     work: Work
 
 
@@ -63,17 +74,24 @@ def motion_for(samples: int, fingers: int) -> Motion:
         np.zeros((samples, 3)),
         np.zeros((samples, 3)),
         np.zeros((samples, fingers, 2)),
-        np.ones(samples - 1, np.bool_),
+        np.zeros((samples, fingers, 2)),
         np.zeros((samples - 1, fingers), np.bool_),
+        np.ones(samples - 1, np.int64),
     )
 
 
 @njit(cache=True, error_model="numpy")
-def run_for(scenes: SceneArrays, plans: Plans, settings: np.record) -> Run:
+def run_for(scenes: SceneArrays, samples: int, fingers: int) -> Run:
     """Memory for any scene of a batch."""
+    work = work_for(fingers, scenes.walls.shape[1], scenes.facets.shape[1])
+    return Run(motion_for(samples, fingers), motion_for(MOST_PARTS + 1, fingers), work)
+
+
+@njit(cache=True, error_model="numpy")
+def run_of_plans(scenes: SceneArrays, plans: Plans, settings: np.record) -> Run:
+    """Memory for any plan of a batch."""
     _, T, C = plans.loaded.shape
-    samples = (T - 1) * settings.substeps + 1
-    return Run(motion_for(samples, C), np.zeros((samples, C, 2)), work_for(C, scenes.walls.shape[1]))
+    return run_for(scenes, (T - 1) * settings.substeps + 1, C)
 
 
 @njit(cache=True, error_model="numpy")
@@ -90,11 +108,17 @@ def table_of(item: Item, settings: np.record) -> Commands:
 
 
 @njit(cache=True, error_model="numpy")
-def execute(item: Item, table: Commands, run: Run) -> bool:
-    """Commands and motion of one plan; False where numbers overflow."""
-    command(table, item.positions, item.forces, item.world.stiffness, run.commands)
+def acceptable(item: Item) -> bool:
+    """Whether a plan is made of finite numbers that leave room to compute with."""
+    return np.abs(item.positions).max() < 1e100 and np.abs(item.forces).max() < 1e100
+
+
+@njit(cache=True, error_model="numpy")
+def execute(item: Item, table: Commands, run: Run) -> int:
+    """Commands and motion of one plan; how it ended."""
+    command(table, item.positions, item.forces, item.world.stiffness, run.motion.commands)
     start_motion(item, table, run.motion)
-    return advance(item.world, run, 0)
+    return advance(item.world, run, 0, True)
 
 
 @njit(cache=True, error_model="numpy")
@@ -105,64 +129,125 @@ def start_motion(item: Item, table: Commands, motion: Motion) -> None:
 
 
 @njit(cache=True, error_model="numpy")
-def advance(world: World, run: Run, start: int) -> bool:
-    """Continue the motion from substep `start` under the run's commands.
+def advance(world: World, run: Run, start: int, adapt: bool) -> int:
+    """Continue the motion from substep `start` under its commands; DONE, or how it ended, with the last state held for good.
 
-    Returns False, and holds the last finite state for good, where numbers overflow.
+    Steps are cut into as many parts as their error asks for, or, without `adapt`, as the motion says.
     """
-    motion, commands, work = run
-    velocity, finger_velocity, contacts = work.velocity, work.finger_velocity, work.problem.contacts
-    poses, velocities, fingers, exact, near = motion
-    for i in range(start, len(commands) - 1):
-        n, exact[i] = solve_step(world, State(poses[i], velocities[i], fingers[i]), commands[i + 1], work)
-        for c in range(near.shape[1]):
-            near[i, c] = False
-        for k in range(n):
-            if contacts[k].finger >= 0:
-                near[i, contacts[k].finger] = True
-        for d in range(3):
-            velocities[i + 1, d] = velocity[d]
-            poses[i + 1, d] = poses[i, d] + world.h * velocity[d]
-        for c in range(near.shape[1]):
-            for d in range(2):
-                fingers[i + 1, c, d] = fingers[i, c, d] + world.h * finger_velocity[c, d]
-        if not finite(motion, i + 1):
-            for j in range(i + 1, len(commands)):
-                poses[j], velocities[j], fingers[j] = poses[i], velocities[i], fingers[i]
-            return False
-    return True
+    motion, _, work = run
+    for i in range(start, len(motion.commands) - 1):
+        motion.near[i, :] = False
+        if adapt:
+            motion.parts[i] = 1
+        end = DONE
+        if motion.parts[i] == 1:
+            end, error = move(world, motion, i, motion.near[i], work)
+            while adapt and error > world.step_error and motion.parts[i] < MOST_PARTS:
+                motion.parts[i] = _enough_parts(motion.parts[i], error / world.step_error)
+                end, error = move_in_parts(world, run, i)
+        else:
+            end, _ = move_in_parts(world, run, i)
+        if end != DONE:
+            hold(motion, i)
+            return end
+    return DONE
 
 
 @njit(cache=True, error_model="numpy")
-def finite(motion: Motion, i: int) -> bool:
-    """Whether state i is made of finite numbers."""
-    total = 0.0
+def _enough_parts(parts: int, excess: float) -> int:
+    """More parts than before, a power of two: the error falls with their number."""
+    while excess > 1 and parts < MOST_PARTS:
+        parts, excess = 2 * parts, excess / 2
+    return parts
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def move(world: World, motion: Motion, i: int, near: np.ndarray, work: Work) -> tuple[int, float]:
+    """Step i in one go; how it ended, and an estimate of its error [m].  Sets flags near (C,) of fingers in contact problems.
+
+    A coasting object is moved by the mean of both velocities: exact for gravity.  Otherwise the last one does, as the contact
+    problem has it, and half the change of velocity is what the object may have moved wrongly.  Contacts that leave it no
+    freedom put that right, and so does a support.
+    """
+    poses, velocities, fingers, commands, _, _ = motion
+    velocity, finger_velocity, h = work.velocity, work.finger_velocity, world.h
+    contacts = work.problem.contacts
+    before = State(poses[i], velocities[i], fingers[i])
+    n, exact = solve_step(world, before, commands[i : i + 2], work)
+    coasting, held = coasts(n, before, work), 0
+    for k in range(n):
+        held += ROWS[contacts[k].state]
+        if contacts[k].finger >= 0:
+            near[contacts[k].finger] = True
+    total, error = 0.0, 0.0
     for d in range(3):
-        total += abs(motion.poses[i, d]) + abs(motion.velocities[i, d])
-    for c in range(motion.fingers.shape[1]):
-        total += abs(motion.fingers[i, c, 0]) + abs(motion.fingers[i, c, 1])
-    return np.isfinite(total)
+        change = 0.5 * h * (velocity[d] - velocities[i, d])
+        velocities[i + 1, d] = velocity[d]
+        poses[i + 1, d] = poses[i, d] + h * velocity[d] - (change if coasting else 0.0)
+        error = max(error, abs(change) * (world.gyration if d == 2 else 1.0))
+        total += abs(poses[i + 1, d]) + abs(velocity[d])
+    for c in range(len(near)):
+        for d in range(2):
+            fingers[i + 1, c, d] = fingers[i, c, d] + h * finger_velocity[c, d]
+            total += abs(fingers[i + 1, c, d])
+    if not np.isfinite(total):
+        return OVERFLOWN, 0.0
+    error *= 0.0 if coasting else (1.0 if held < 3 and world.support == 0 else HELD)
+    return DONE if exact else UNSOLVED, error
 
 
 @njit(cache=True, error_model="numpy")
-def acceptable(item: Item) -> bool:
-    """Whether a plan is made of finite numbers that leave room to compute with."""
-    return np.abs(item.positions).max() < 1e100 and np.abs(item.forces).max() < 1e100
+def move_in_parts(world: World, run: Run, i: int) -> tuple[int, float]:
+    """Step i in as many parts as the motion says; how it ended, and an estimate of its error [m]."""
+    motion, fine, work = run
+    parts = motion.parts[i]
+    finer, total = load_parts(world, run, i), 0.0
+    for j in range(parts):
+        end, error = move(finer, fine, j, motion.near[i], work)
+        total += error
+        if end != DONE:
+            return end, total
+    motion.poses[i + 1], motion.velocities[i + 1] = fine.poses[parts], fine.velocities[parts]
+    motion.fingers[i + 1] = fine.fingers[parts]
+    return DONE, total
+
+
+@njit(cache=True, error_model="numpy")
+def load_parts(world: World, run: Run, i: int) -> World:
+    """State and commands of step i into the finer motion; the world whose step is one of its parts."""
+    motion, fine, _ = run
+    parts = motion.parts[i]
+    fine.poses[0], fine.velocities[0] = motion.poses[i], motion.velocities[i]
+    fine.fingers[0] = motion.fingers[i]
+    for j in range(parts + 1):
+        s = j / parts
+        for c in range(fine.commands.shape[1]):
+            for d in range(2):
+                fine.commands[j, c, d] = (1 - s) * motion.commands[i, c, d] + s * motion.commands[i + 1, c, d]
+    return with_step(world, world.h / parts)
+
+
+@njit(cache=True, error_model="numpy")
+def hold(motion: Motion, i: int) -> None:
+    """State i for the rest of the motion."""
+    for j in range(i + 1, len(motion.poses)):
+        motion.poses[j], motion.velocities[j] = motion.poses[i], motion.velocities[i]
+        motion.fingers[j] = motion.fingers[i]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def execute_batch(scenes: SceneArrays, plans: Plans, settings: np.record) -> tuple[np.ndarray, np.ndarray]:
-    """Poses at the knots (B, T, 3) and status (B,).
+    """Poses at the knots (B, T, 3), and how each motion ended (B,).
 
-    A plan that is not finite leaves its object where it is and gets status False.
+    A plan that is not finite leaves its object where it is, OVERFLOWN.
     """
     B, T, _ = plans.loaded.shape
-    poses, ok = np.zeros((B, T, 3)), np.zeros(B, np.bool_)
-    run = run_for(scenes, plans, settings)
+    poses, ends = np.zeros((B, T, 3)), np.full(B, OVERFLOWN)
+    run = run_of_plans(scenes, plans, settings)
     for b in range(B):
         item = item_of(scenes, plans, b, settings)
         poses[b, :] = item.start
         if acceptable(item):
-            ok[b] = execute(item, table_of(item, settings), run)
+            ends[b] = execute(item, table_of(item, settings), run)
             poses[b] = run.motion.poses[:: settings.substeps]
-    return poses, ok
+    return poses, ends

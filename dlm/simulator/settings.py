@@ -47,7 +47,8 @@ class Execution:
 class SimulatorSettings:
     """Time stepping, contact smoothing and gradients.
 
-    substeps: steps per knot interval.  finger_radius [m].  damping: of the finger springs [N s/m].
+    substeps: steps per knot interval.  step_error [m]: where a step's error is estimated to be larger, it is cut into parts;
+    inf never does.  finger_radius [m].  damping: of the finger springs, as a share of the critical 2 sqrt(stiffness mass).
     regularization: contact compliance as a share of the diagonal of the LCP matrix.
     kappa [1/m]: contact activation min(1, 2 sigmoid(-kappa gap)) (Thesis 4-CT9); inf is rigid contact.
     frictionless: no friction at fingers and walls (the support plane keeps its own).
@@ -55,8 +56,9 @@ class SimulatorSettings:
     """
 
     substeps: int = 20
+    step_error: float = 2e-6
     finger_radius: float = 1e-4
-    damping: float = 0.0
+    damping: float = 1.0
     regularization: float = 1e-4
     kappa: float = np.inf
     frictionless: bool = False
@@ -74,7 +76,9 @@ class SimulatorSettings:
         ):
             value = getattr(self, name)
             require(low <= value < high, f"simulator.{name}", expected, value)
-        require(self.kappa > 0, "simulator.kappa", "a positive number, inf for rigid contact", self.kappa)
+        for name, meaning in (("kappa", "rigid contact"), ("step_error", "steps that are never cut")):
+            value = getattr(self, name)
+            require(value > 0, f"simulator.{name}", f"a positive number, inf for {meaning}", value)
         methods = ("finite_difference", "implicit")
         require(self.gradient in methods, "simulator.gradient", " or ".join(methods), self.gradient)
 

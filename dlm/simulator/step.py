@@ -1,10 +1,10 @@
 """One time step (Thesis 4-CT8): velocities and impulses from a complementarity problem, then positions.
 
     M (v+ - v) = h g + J^T P + h (support friction)      q+ = q + h v+
-    k (u - p+) - d w - P / h = 0                         p+ = p + h w
+    k (u+ - p+) + d ((u+ - u) / h - w) - P / h = 0       p+ = p + h w
 
-A finger at p is a massless spring k with damper d that follows its command u at velocity w; P / h is its force on the
-object.  The relative velocity J v+ - w at every contact and the impulses P solve the problem of `lcp`.
+A finger at p is a massless spring k with damper d that follows its command, from u to u+, at velocity w; P / h is its force
+on the object.  The relative velocity J v+ - w at every contact and the impulses P solve the contact problem.
 
 A step takes a microsecond.  Numba counts references of every array that a call passes, so the small functions of the
 inner loop are inlined; that halves the time.
@@ -16,8 +16,9 @@ import numpy as np
 from numba import njit
 
 from dlm.simulator import support
-from dlm.simulator.contact import WALL_POINTS, Moment, activation, collect
-from dlm.simulator.lcp import Problem, problem_for, solve_contacts
+from dlm.simulator.contact import Moment, activation, collect
+from dlm.simulator.lcp import solve_contacts
+from dlm.simulator.problem import OPEN, Problem, problem_for
 from dlm.simulator.world import State, World
 
 SHALLOW = 1e-5
@@ -29,7 +30,7 @@ CORRECTION, FASTEST_CORRECTION = 0.2, 0.5
 class Work(NamedTuple):
     """Scratch memory of one step, and its results.
 
-    problem: see `lcp`.  mobility (3, 3): velocity per impulse.  Velocities of the object (3,): predicted without any forces
+    mobility (3, 3): velocity per impulse.  Velocities of the object (3,): predicted without any forces
     but gravity, free of contacts, and at the end of the step; of the fingers (C, 2): free of contacts, and at the end.
     """
 
@@ -43,10 +44,10 @@ class Work(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def work_for(fingers: int, walls: int) -> Work:
-    """Scratch memory for scenes with at most so many fingers and walls."""
+def work_for(fingers: int, walls: int, vertices: int) -> Work:
+    """Scratch memory for scenes with at most so many: a finger touches two facets of a corner, a wall any vertex."""
     return Work(
-        problem_for(2 * fingers + WALL_POINTS * walls),
+        problem_for(2 * fingers + vertices * walls),
         np.zeros((3, 3)),
         np.zeros(3),
         np.zeros(3),
@@ -57,17 +58,19 @@ def work_for(fingers: int, walls: int) -> Work:
 
 
 @njit(cache=True, error_model="numpy")
-def solve_step(world: World, state: State, command: np.ndarray, work: Work) -> tuple[int, bool]:
-    """Velocities at the end of the step under commands (C, 2), into work.velocity and work.finger_velocity.
+def solve_step(world: World, state: State, commands: np.ndarray, work: Work) -> tuple[int, bool]:
+    """Velocities at the end of the step, into work.velocity and work.finger_velocity.
 
-    Returns the number of contacts and whether their problem was solved exactly.
+    commands (2, C, 2): at the step's begin and end.  Returns the number of contacts and whether their problem was solved.
     """
     q, v, p = state
     predicted, finger_free = work.predicted, work.finger_free
     predicted[0], predicted[1], predicted[2] = v[0], v[1] - world.h * world.gravity, v[2]
+    follow, lead = spring_rates(world)
     for c in range(len(p)):
-        finger_free[c, 0] = world.follow * (command[c, 0] - p[c, 0])
-        finger_free[c, 1] = world.follow * (command[c, 1] - p[c, 1])
+        for d in range(2):
+            u, target = commands[0, c, d], commands[1, c, d]
+            finger_free[c, d] = follow * (target - p[c, d]) + lead * (target - u)
     now = Moment(q, np.cos(q[2]), np.sin(q[2]), predicted, p, finger_free)
     n = collect(world, now, work.problem.contacts)
     _contact_rows(n, q, work.problem)
@@ -79,6 +82,19 @@ def solve_step(world: World, state: State, command: np.ndarray, work: Work) -> t
         W[d, d] = 1 / (world.inertia if d == 2 else world.mass)
         free[d] = predicted[d]
     return n, _solve_velocities(n, world, work)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def coasts(n: int, before: State, work: Work) -> bool:
+    """Whether no contact acts in the step that was solved, nor would if the mean of both velocities moved the object."""
+    contacts, rows, _, _ = work.problem
+    v, after = before.velocity, work.velocity
+    for i in range(n):
+        row = rows[2 * i]
+        slower = row.x * (v[0] - after[0]) + row.y * (v[1] - after[1]) + row.turn * (v[2] - after[2])
+        if contacts[i].state != OPEN or row.c + 0.5 * slower < 0:
+            return False
+    return True
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -111,6 +127,19 @@ def bias(gap: float, h: float, kappa: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
+def finger_mobility(world: World) -> float:
+    """Velocity of a finger per impulse on it."""
+    return 1 / (world.h * (world.stiffness * world.h + world.damping))
+
+
+@njit(cache=True, error_model="numpy")
+def spring_rates(world: World) -> tuple[float, float]:
+    """Velocity of a free finger per distance to its command, and per distance that the command goes in the step."""
+    resistance = world.stiffness * world.h + world.damping
+    return world.stiffness / resistance, world.damping / (resistance * world.h)
+
+
+@njit(cache=True, error_model="numpy")
 def contact_scale(world: World, lever: float, give: float) -> float:
     """What a row would have on the diagonal of A for a free object: the unit of the contact's compliance."""
     return 1 / world.mass + lever * lever / world.inertia + give
@@ -120,7 +149,7 @@ def contact_scale(world: World, lever: float, give: float) -> float:
 def assemble_problem(n: int, world: World, work: Work) -> None:
     """A = J W J^T + finger mobility + compliance and c = relative velocity without impulses + bias."""
     contacts, rows, A, _ = work.problem
-    W, free, finger_free = work.mobility, work.free, work.finger_free
+    W, free, finger_free, give = work.mobility, work.free, work.finger_free, finger_mobility(world)
     for r in range(2 * n):
         row, contact = rows[r], contacts[r // 2]
         f = contact.finger
@@ -131,9 +160,9 @@ def assemble_problem(n: int, world: World, work: Work) -> None:
             other = rows[s]
             value = w0 * other.x + w1 * other.y + w2 * other.turn
             if f >= 0 and contacts[s // 2].finger == f:
-                value += world.give * (row.x * other.x + row.y * other.y)
+                value += give * (row.x * other.x + row.y * other.y)
             A[r, s] = A[s, r] = value
-        scale = contact_scale(world, row.turn, world.give if f >= 0 else 0.0)
+        scale = contact_scale(world, row.turn, give if f >= 0 else 0.0)
         A[r, r] += scale * softness(contact.gap, world.kappa, world.regularization)
         c = row.x * free[0] + row.y * free[1] + row.turn * free[2]
         if f >= 0:
@@ -157,6 +186,7 @@ def _apply_impulses(n: int, world: World, work: Work) -> None:
     """Velocities of object and fingers from the impulses."""
     contacts, rows, _, _ = work.problem
     velocity, free, finger_velocity = work.velocity, work.free, work.finger_velocity
+    give = finger_mobility(world)
     finger_velocity[:] = work.finger_free
     x, y, turn = 0.0, 0.0, 0.0
     for r in range(2 * n):
@@ -165,8 +195,8 @@ def _apply_impulses(n: int, world: World, work: Work) -> None:
         y += row.y * row.P
         turn += row.turn * row.P
         if f >= 0:
-            finger_velocity[f, 0] -= world.give * row.x * row.P
-            finger_velocity[f, 1] -= world.give * row.y * row.P
+            finger_velocity[f, 0] -= give * row.x * row.P
+            finger_velocity[f, 1] -= give * row.y * row.P
     W = work.mobility
     for k in range(3):
         velocity[k] = free[k] + W[k, 0] * x + W[k, 1] * y + W[k, 2] * turn

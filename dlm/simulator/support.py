@@ -28,7 +28,7 @@ def directions(world: World, pose: np.ndarray, velocity: np.ndarray) -> np.ndarr
     return w
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def linearise(
     world: World, pose: np.ndarray, guess: np.ndarray, w: np.ndarray, K: np.ndarray, b: np.ndarray
 ) -> None:
@@ -55,7 +55,7 @@ def linearise(
                         K[i, j] += S[d, i] * D[d, e] * S[e, j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def update_directions(
     world: World, pose: np.ndarray, before: np.ndarray, after: np.ndarray, w: np.ndarray
 ) -> float:

@@ -11,7 +11,7 @@ from dlm.simulator.scene import SceneArrays
 class World(NamedTuple):
     """One scene of a batch without its padding, and how to step it.
 
-    h: time step [s].  give: velocity of a finger per impulse on it; follow: its velocity per distance to its command.
+    gyration: radius of, sqrt(inertia / mass).  damping: of the fingers' springs [N s/m].  h: time step [s].
     Few arrays: passing one costs as much as ten multiplications.
     """
 
@@ -19,6 +19,7 @@ class World(NamedTuple):
     walls: np.ndarray
     mass: float
     inertia: float
+    gyration: float
     friction: float
     stiffness: float
     damping: float
@@ -27,9 +28,8 @@ class World(NamedTuple):
     radius: float
     kappa: float
     regularization: float
+    step_error: float
     h: float
-    give: float
-    follow: float
 
 
 class State(NamedTuple):
@@ -43,24 +43,45 @@ class State(NamedTuple):
 @njit(cache=True, error_model="numpy")
 def world_of(scenes: SceneArrays, b: int, settings: np.record) -> World:
     """Scene b of a batch under settings, a record of NUMBERS."""
-    h = scenes.dt[b] / settings.substeps
-    resistance = scenes.stiffness[b] * h + settings.damping
+    mass, stiffness = scenes.mass[b], scenes.stiffness[b]
     return World(
         scenes.facets[b, : scenes.vertex_count[b]],
         scenes.walls[b, : scenes.wall_count[b]],
-        scenes.mass[b],
+        mass,
         scenes.inertia[b],
+        np.sqrt(scenes.inertia[b] / mass),
         scenes.friction[b],
-        scenes.stiffness[b],
-        settings.damping,
+        stiffness,
+        settings.damping * 2 * np.sqrt(stiffness * mass),
         scenes.gravity[b],
         scenes.support[b],
         settings.finger_radius,
         settings.kappa,
         settings.regularization,
+        settings.step_error,
+        scenes.dt[b] / settings.substeps,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def with_step(world: World, h: float) -> World:
+    """The same scene with another time step."""
+    return World(
+        world.facets,
+        world.walls,
+        world.mass,
+        world.inertia,
+        world.gyration,
+        world.friction,
+        world.stiffness,
+        world.damping,
+        world.gravity,
+        world.support,
+        world.radius,
+        world.kappa,
+        world.regularization,
+        world.step_error,
         h,
-        1 / (h * resistance),
-        scenes.stiffness[b] / resistance,
     )
 
 

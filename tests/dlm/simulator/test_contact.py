@@ -10,6 +10,7 @@ from dlm.simulator import SceneBatch, SimulatorSettings
 from dlm.simulator.contact import CONTACT, FACET, WALL, Moment, activation, collect, nearest
 from dlm.simulator.world import World, world_of
 from expert.geometry.polygon import signed_distance
+from expert.geometry.pose import rotation
 from expert.world.shape import Body
 from tests.support.scenes import T, scene
 
@@ -23,7 +24,7 @@ def world(vertices) -> World:
 
 
 def contacts_at(vertices, finger, pose=REST):
-    out, fingers = np.zeros(10, CONTACT), np.array([finger], dtype=float)
+    out, fingers = np.zeros(20, CONTACT), np.array([finger], dtype=float)
     now = Moment(pose, np.cos(pose[2]), np.sin(pose[2]), np.zeros(3), fingers, np.zeros((1, 2)))
     return out[: collect(world(vertices), now, out)]
 
@@ -59,14 +60,19 @@ def test_far_fingers_and_high_vertices_are_left_out():
     assert sorted(contacts["feature"]) == [0, 1]
 
 
-def test_only_the_lowest_vertices_touch_a_wall():
+def test_the_lower_hull_of_the_near_vertices_touches_a_wall():
     angles = 2 * np.pi * np.arange(12) / 12
     ring = 1e-4 * np.column_stack([np.cos(angles), np.sin(angles)])  # all twelve within reach of the floor
     contacts = contacts_at(ring, [0.5, 0.5], np.array([0, 1e-4, 0]))
-    lowest = np.argsort(ring[:, 1])[:4]
-    assert len(contacts) == 4
-    assert contacts["gap"].max() <= np.sort(ring[:, 1])[4] + 1e-4
-    assert set(lowest[:3]) <= set(contacts["feature"])
+    assert sorted(contacts["feature"]) == [0, 6, 7, 8, 9, 10, 11]
+
+
+def test_of_vertices_on_a_line_the_ends_touch_a_wall():
+    cut = np.column_stack([np.linspace(0, 0.06, 14), np.zeros(14)])
+    vertices = np.vstack([cut, [[0.06, 0.04], [0, 0.04]]])
+    for angle, ends in ((0, [0, 13]), (0.003, [0, 13]), (-0.02, [0, 13]), (0.1, [0, 4])):
+        pose = np.array([0, -(rotation(angle) @ vertices.T)[1].min(), angle])
+        assert sorted(contacts_at(vertices, [0.5, 0.5], pose)["feature"]) == ends
 
 
 def test_activation_is_one_in_contact_and_tends_to_the_rigid_law():

@@ -1,103 +1,86 @@
-"""The contact problem against its own definition, and against every active set there is."""
-
-import itertools
+"""The contact problem against its own definition, and against every solution there is."""
 
 import numpy as np
 import pytest
 
-from dlm.simulator.lcp import (
-    OPEN,
-    ROW,
-    SLIP_MINUS,
-    SLIP_PLUS,
-    STICK,
-    problem_for,
-    solve_contacts,
-    solve_linear,
-)
+from dlm.simulator.lcp import settle, solve_contacts
+from dlm.simulator.lemke import lemke
+from dlm.simulator.modes import find_mode, has_other_solutions
+from dlm.simulator.problem import ROW, Problem, problem_for, solve_linear
+from tests.support.contact_modes import ContactProblem
 
 
-def random_problem(rng, n, friction):
-    """A positive definite, c mostly closing."""
+def random_problem(rng: np.random.Generator, n: int, friction: float) -> ContactProblem:
+    """Contacts of one planar body, more of them than it has freedoms, mostly closing."""
     J = rng.normal(size=(2 * n, 3))
-    A = J @ J.T + np.diag(rng.uniform(0.01, 1, 2 * n))
-    return A, rng.normal(-0.5, 1, 2 * n), np.full(n, friction)
+    A = J @ J.T
+    A += 1e-4 * np.diag(np.diag(A))
+    return ContactProblem(A.reshape(n, 2, n, 2), rng.normal(-0.5, 1, (n, 2)), np.full(n, friction))
 
 
-def solve(A, c, mu):
-    n = len(mu)
-    problem = problem_for(n)
-    problem.contacts["friction"], problem.rows["c"], problem.A[:] = mu, c, A
-    exact = solve_contacts(n, problem)
-    return problem.rows["P"].copy(), problem.contacts["state"].copy(), exact
+def memory(problem: ContactProblem) -> Problem:
+    n = len(problem.mu)
+    out = problem_for(n)
+    out.contacts["friction"], out.rows["c"] = problem.mu, problem.c.ravel()
+    out.A[:] = problem.A.reshape(2 * n, 2 * n)
+    return out
 
 
-def violation(A, c, mu, P):
-    """Largest violation of signs, cones, complementarity and of friction opposing slip."""
-    y = A @ P + c
-    normal, tangential, y_n, y_t = P[::2], P[1::2], y[::2], y[1::2]
-    limit = mu * normal
-    parts = [
-        -normal,
-        -y_n,
-        np.abs(normal * y_n),
-        np.abs(tangential) - limit,
-        np.abs((limit - tangential) * np.minimum(y_t, 0)),
-        np.abs((limit + tangential) * np.maximum(y_t, 0)),
-    ]
-    return max(float(np.max(p)) for p in parts)
+def impulses(problem: Problem) -> np.ndarray:
+    return problem.rows["P"].reshape(-1, 2).copy()
 
 
-def solutions(A, c, mu):
-    """Impulses of every active set that solves the problem, by trying all of them."""
-    found = []
-    for states in itertools.product((OPEN, STICK, SLIP_PLUS, SLIP_MINUS), repeat=len(mu)):
-        columns, rows = [], []
-        for i, state in enumerate(states):
-            normal, tangent = np.eye(len(c))[2 * i], np.eye(len(c))[2 * i + 1]
-            if state == STICK:
-                columns += [normal, tangent]
-                rows += [2 * i, 2 * i + 1]
-            elif state != OPEN:
-                columns.append(normal + (mu[i] if state == SLIP_PLUS else -mu[i]) * tangent)
-                rows.append(2 * i)
-        P = np.zeros(len(c))
-        if columns:
-            V = np.array(columns).T
-            P = V @ np.linalg.solve((A @ V)[rows], -c[rows])
-        if violation(A, c, mu, P) < 1e-9:
-            found.append(P)
-    return found
+def by_lemke(n: int, problem: Problem) -> bool:
+    return lemke(n, problem) and settle(n, problem)
 
 
+def by_trial(n: int, problem: Problem) -> bool:
+    find_mode(n, problem)
+    return settle(n, problem)
+
+
+@pytest.mark.parametrize("method", [solve_contacts, by_lemke, by_trial])
 @pytest.mark.parametrize("n", [1, 2, 3])
-def test_the_solution_is_among_those_of_all_active_sets(n):
+def test_every_method_finds_one_of_all_solutions(method, n):
     rng = np.random.default_rng(n)
-    for _ in range(60):
-        A, c, mu = random_problem(rng, n, rng.uniform(0, 0.8))
-        P, _, exact = solve(A, c, mu)
-        assert exact
-        assert min(np.abs(P - Q).max() for Q in solutions(A, c, mu)) < 1e-9
+    for _ in range(40):
+        problem = random_problem(rng, n, rng.uniform(0, 3))
+        work = memory(problem)
+        assert method(n, work)
+        found = problem.solutions()
+        assert min(np.abs(impulses(work) - Q).max() / np.abs(Q).max(initial=1e-9) for Q in found) < 1e-6
 
 
-def test_larger_problems_keep_signs_cones_and_complementarity():
+@pytest.mark.parametrize("friction", [0.5, 2.0])
+def test_larger_problems_are_solved_too(friction):
     rng = np.random.default_rng(0)
-    exact = 0
-    for _ in range(300):
-        A, c, mu = random_problem(rng, 6, 0.5)
-        P, _, solved = solve(A, c, mu)
-        exact += solved
-        assert (P[::2] >= -1e-12).all()
-        assert (np.abs(P[1::2]) <= mu * P[::2] + 1e-9).all()
-        assert not solved or violation(A, c, mu, P) < 1e-8
-    assert exact >= 297
+    for _ in range(200):
+        problem = random_problem(rng, 6, friction)
+        work = memory(problem)
+        assert solve_contacts(6, work)
+        assert problem.violation(impulses(work)) < 1e-8
+
+
+def test_other_solutions_are_seen_where_there_are_some_and_the_one_found_stays():
+    rng = np.random.default_rng(5)
+    seen = {True: 0, False: 0}
+    for _ in range(150):
+        problem = random_problem(rng, 2, rng.uniform(0, 3))
+        work = memory(problem)
+        assert solve_contacts(2, work)
+        before = impulses(work)
+        several = has_other_solutions(2, work)
+        assert several == (len(problem.solutions()) > 1)
+        np.testing.assert_array_equal(impulses(work), before)
+        seen[several] += 1
+    assert min(seen.values()) > 3
 
 
 def test_without_friction_no_tangential_impulse():
-    A, c, _ = random_problem(np.random.default_rng(3), 4, 0)
-    P, _, exact = solve(A, c, np.zeros(4))
-    assert exact
-    assert not P[1::2].any()
+    problem = random_problem(np.random.default_rng(3), 4, 0)
+    work = memory(problem)
+    assert solve_contacts(4, work)
+    assert not impulses(work)[:, 1].any()
 
 
 def test_linear_solver_agrees_with_lapack_and_refuses_singular_matrices():

@@ -19,7 +19,14 @@ def test_bad_execution_settings_are_refused_by_name(field, bad):
 
 @pytest.mark.parametrize(
     ("field", "bad"),
-    [("substeps", 0), ("finger_radius", 0.0), ("kappa", np.nan), ("gradient", "magic"), ("damping", -1.0)],
+    [
+        ("substeps", 0),
+        ("finger_radius", 0.0),
+        ("kappa", np.nan),
+        ("gradient", "magic"),
+        ("damping", -1.0),
+        ("step_error", 0.0),
+    ],
 )
 def test_bad_simulator_settings_are_refused_by_name(field, bad):
     with pytest.raises(InvalidProblem, match=f"simulator.{field}"):
