@@ -18,7 +18,7 @@ from dlm.simulator.world import State, World, with_step, world_of
 DONE, OVERFLOWN, UNSOLVED = 0, 1, 2
 """How a motion ends: as planned, with numbers that are not finite, with a contact problem that rounding made unsolvable."""
 UNSOLVED_STEP = "simulation: the contact problem of a step was not solved"
-HELD = 0.1
+HELD = 0.05
 """Share of a step's error that stays where contacts hold all three freedoms of the object, or its support brakes them."""
 MOST_PARTS = 32
 """Of one step."""

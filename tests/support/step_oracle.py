@@ -1,6 +1,6 @@
 """One time step of the simulator written down a second time, in plain numpy: the contact problem of a convex object.
 
-Follows docs/simulator.md and shares no code with `dlm.simulator`: all vertices near a wall, fingers by shapely.
+Follows docs/theory/simulator.md and shares no code with `dlm.simulator`: all vertices near a wall, fingers by shapely.
 """
 
 from dataclasses import dataclass

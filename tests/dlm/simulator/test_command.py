@@ -32,7 +32,11 @@ def test_a_robust_plan_reaches_its_goal_in_both_engines(solution, tmp_path, caps
     assert main(arguments) == 0
     result = json.loads(files["--json"].read_text())
     assert result["simulator"]["final_mm"] < 1
-    np.testing.assert_allclose(result["simulator"]["poses"][-1], result["mujoco"]["poses"][-1], atol=1e-3)
+    ours, theirs = (np.array(result[engine]["poses"][-1]) for engine in ("simulator", "mujoco"))
+    assert np.abs(ours - theirs)[:2].max() < 1e-4
+    assert abs(ours[2] - theirs[2]) < np.radians(
+        0.1
+    )  # at half its step MuJoCo turns by some hundredths of a degree
     assert files["--mjcf"].read_text().startswith("<mujoco")
     with Image.open(files["-o"]) as strip:
         assert strip.size[0] > 500

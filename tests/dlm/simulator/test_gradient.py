@@ -35,8 +35,13 @@ def cosines(a, b):
 def test_implicit_equals_central_differences_of_a_tiny_step(plane, kappa):
     rng = np.random.default_rng(1)
     cases = [random_case(rng, plane=plane) for _ in range(25)]
+    step = 1e-9 if np.isinf(kappa) else 1e-10  # smoothed contacts curve strongly
     exact = gradient(cases, gradient="implicit", kappa=kappa)
-    differences = gradient(cases, gradient="finite_difference", difference_step=1e-9, kappa=kappa)
+    differences = gradient(cases, gradient="finite_difference", difference_step=step, kappa=kappa)
+    felt = exact.any(axis=1)
+    np.testing.assert_array_equal(felt, differences.any(axis=1))
+    assert felt.sum() >= 20  # from the others the object falls away untouched
+    exact, differences = exact[felt], differences[felt]
     cosine = cosines(exact, differences)
     assert np.median(cosine) > 1 - 1e-9
     assert np.quantile(cosine, 0.1) > 0.999

@@ -27,7 +27,8 @@ def test_an_exported_file_holds_the_whole_plan(tmp_path):
     assert mujoco.MjModel.from_xml_path(str(path)).nq == 3 + 4
     replayed = replay_model(path.read_text())
     ours = replay(case.scene, case.positions, case.forces)
-    np.testing.assert_allclose(replayed.poses, ours.poses, atol=2e-4)
+    np.testing.assert_allclose(replayed.poses[:, :2], ours.poses[:, :2], atol=2e-4)
+    np.testing.assert_allclose(replayed.poses[:, 2], ours.poses[:, 2], atol=np.radians(0.2))
     np.testing.assert_allclose(replayed.fingers[::20], ours.fingers[::20], atol=5e-4)
 
 
