@@ -34,7 +34,7 @@ from expert.errors import InvalidProblem
 from expert.files.output import claimed
 from expert.world.values import require
 
-PACKAGES = ("certified-manipulation", "numpy", "scipy", "shapely", "numba", "daqp", "opencv-python-headless")
+PACKAGES = ("certified-manipulation", "numpy", "scipy", "shapely", "numba", "opencv-python-headless")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -97,8 +97,8 @@ def regrets(sample: Sample, schedules: Schedules) -> Array:
     modes = schedules.modes(schedules.classes(len(sample.task.body.vertices)))
     bounds, costs = costs_at_modes(sample.task, modes, gap=1e-2)
     least = np.where(np.isfinite(costs), costs, np.maximum(bounds, 0.0))
-    best = sample.plan.objective / sample.task.weight**2
-    return np.clip(least / max(best, 1e-9) - 1, 0.0, MOST_REGRET)
+    best = sample.plan.objective
+    return np.clip(least / max(best, 1e-9 * sample.task.weight**2) - 1, 0.0, MOST_REGRET)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,7 +3,6 @@
 Slow and independent of the other methods: it exists to cross-check them on small tasks.
 """
 
-import time
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 import pyscipopt
 from pyscipopt import quicksum
 
+from expert.budget import Budget
 from expert.contact.recovery import Found, balanced, modes_of, plan_of
 from expert.contact.scaled import ScaledTask, end_points
 from expert.errors import SolverFailed
@@ -39,22 +39,22 @@ class Bilinear:
     reaction: dict
 
 
-def solve(task: ContactTask, *, gap: float = 1e-3, time_limit: float = 60.0) -> Plan:
+def solve(task: ContactTask, *, gap: float, time_limit: float) -> Plan:
     """Globally optimal plan of the exact problem, to SCIP's tolerance.
 
     Raises SolverFailed where SCIP failed numerically, KeyboardInterrupt when interrupted.
     """
-    start = time.perf_counter()
+    budget = Budget(time_limit)
     s = ScaledTask.of(task)
     m = build(task, s)
-    scip_limits(m.scip, gap, time_limit)
+    scip_limits(m.scip, gap, budget.left)
     m.scip.setParam("numerics/feastol", TOLERANCE)
     m.scip.optimize()
     answer = scip_answer(m.scip, [])
     if answer.status == "failed":
         raise SolverFailed(f"bilinear model: SCIP gave no answer ({answer.message})")
-    spent: dict[str, Any] = {"bound": answer.bound * s.weight**2, "nodes": answer.nodes}
-    spent["seconds"] = time.perf_counter() - start
+    spent: dict[str, Any] = {"bound": answer.bound * s.cost_unit, "nodes": answer.nodes}
+    spent["seconds"] = budget.spent
     if answer.x is None:
         reason = "the exact bilinear model has no solution" if answer.status == "infeasible" else ""
         status: Status = "infeasible" if answer.status == "infeasible" else "time_limit"

@@ -10,12 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from expert.budget import Budget
-from expert.contact.box import narrow, relax
+from expert.contact.box import Box
 from expert.contact.plan_at import plan_at
 from expert.contact.polish import polish
+from expert.contact.ranges import narrow
+from expert.contact.relaxation import Goal, relax
 from expert.contact.scaled import ScaledTask
-from expert.contact.search import Best, Tree
 from expert.contact.sequence import sequence_of
+from expert.contact.tree import Best, Tree
 from expert.errors import SolverFailed
 from expert.geometry.pose import Array
 from expert.numeric.qp import compiled
@@ -29,7 +31,7 @@ ROUNDS = 12
 @dataclass(frozen=True)
 class AtModes:
     """plan: the best one, None where there is none.  bounds (k,): no plan of a sequence costs less (inf: proved to have
-    none), in (m g)^2.  undecided: the search stopped before every sequence was settled."""
+    none), [SI].  undecided: the search stopped before every sequence was settled."""
 
     plan: Plan | None
     bounds: Array
@@ -54,13 +56,14 @@ def plan_at_modes(task: ContactTask, modes: IntArray, *, gap: float, node_limit:
                 float(bound), sequence, *(end[k, : sequence.lo.size] for end in (first.low, first.high))
             )
     outcome = tree.run(Budget(np.inf), node_limit)
-    return AtModes(_polished(task, scaled, outcome.best), first.bounds, outcome.limited)
+    return AtModes(_polished(task, scaled, outcome.best), scaled.cost_unit * first.bounds, outcome.limited)
 
 
 def costs_at_modes(task: ContactTask, modes: IntArray, *, gap: float) -> tuple[Array, Array]:
-    """Bounds and costs (k,) [(m g)^2] of all mode sequences (k, T, C) after one pass; cost inf: no plan found."""
-    first = _screen(ScaledTask.of(task), modes, gap, True)
-    return first.bounds, first.costs
+    """Bounds and costs (k,) [SI] of all mode sequences (k, T, C) after one pass; cost inf: no plan found."""
+    scaled = ScaledTask.of(task)
+    first = _screen(scaled, modes, gap, True)
+    return scaled.cost_unit * first.bounds, scaled.cost_unit * first.costs
 
 
 class Screened(NamedTuple):
@@ -83,10 +86,10 @@ def _screen(scaled: ScaledTask, modes: IntArray, gap: float, everyone: bool) -> 
     for k in range(N):
         sequence = sequence_of(scaled, modes[k])
         lo, hi = sequence.lo.copy(), sequence.hi.copy()
-        if (lo > hi).any() or not narrow(scaled, sequence, lo, hi):
+        if not narrow(scaled, sequence, lo, hi)[0]:
             continue
-        target = np.inf if everyone else best
-        found = relax(scaled, sequence, lo, hi, np.full((T, C), -1), target, gap, ROUNDS)
+        goal = Goal(np.inf if everyone else best, gap, ROUNDS)
+        found = relax(scaled, Box(sequence, lo, hi, np.full((T, C), -1)), goal)
         bounds[k], costs[k] = found.bound, found.cost
         low[k, : lo.size], high[k, : lo.size] = lo, hi
         points[k, : found.z.size] = found.z
@@ -98,7 +101,7 @@ def _polished(task: ContactTask, scaled: ScaledTask, best: Best) -> Plan | None:
     """None where forces do not balance numerically, or there is nothing to polish."""
     if best.sequence is None:
         return None
-    z = polish(scaled, best.sequence, best.z).z
+    z = polish(scaled, best.sequence, best.z, Budget(np.inf)).z
     try:
         return plan_at(task, scaled, best.sequence, z, status="feasible")
     except SolverFailed:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from expert.contact.scaled import ScaledTask
-from expert.contact.steps import solve_step
+from expert.contact.steps import Stance, solve_step
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
 from expert.numeric.qp import INFEASIBLE, compiled
@@ -68,33 +68,43 @@ def _successors(facets: int, min_interval: int) -> list[list[int]]:
     return follow
 
 
-def step_costs(scaled: ScaledTask, fingers: int) -> Array:
-    """phi[t, S]: lower bound of the force cost at t with active set S, (T, (F + 1)^C); inf: proved impossible.
+class StepCosts(NamedTuple):
+    """Lower bounds of force costs by step and set of active facets, and their proofs.
 
-    S in base F + 1: one digit per finger, 1 + facet or 0.  Fingers are interchangeable, so each multiset is solved once.
+    cost (T, (F + 1)^C), inf: proved impossible; sets in base F + 1, one digit per finger, 1 + facet or 0.  y (T, M, 3):
+    multipliers of the M multisets in lexicographic order, fingers being interchangeable.
     """
+
+    cost: Array
+    y: Array
+
+
+def step_costs(scaled: ScaledTask, fingers: int) -> StepCosts:
+    """Least force cost of every active set at every step."""
     base = scaled.facets + 1
     sets = np.array(list(itertools.combinations_with_replacement(range(base), fingers)))
     digits = np.array(list(itertools.product(range(base), repeat=fingers)))
     place = base ** np.arange(fingers)[::-1]
     column = np.empty(base**fingers, dtype=np.int64)
     column[sets @ place] = np.arange(len(sets))
-    return _set_costs(scaled, sets)[:, column[np.sort(digits, axis=1) @ place]]
+    costs, y = _set_costs(scaled, sets)
+    return StepCosts(costs[:, column[np.sort(digits, axis=1) @ place]], y)
 
 
 @compiled
-def _set_costs(scaled: ScaledTask, sets: IntArray) -> Array:
+def _set_costs(scaled: ScaledTask, sets: IntArray) -> tuple[Array, Array]:
     T, M = len(scaled.required), len(sets)
-    costs = np.full((T, M), np.inf)
+    costs, y = np.full((T, M), np.inf), np.zeros((T, M, 3))
     for k in range(M):
         facets = sets[k][sets[k] > 0] - 1
         for t in range(T):
-            lo, hi = scaled.low[t][facets], scaled.high[t][facets]
-            if (lo <= hi).all():
-                status, _, bound, _, _ = solve_step(scaled, t, facets, lo, hi)
-                if status != INFEASIBLE:
-                    costs[t, k] = bound
-    return costs
+            stance = Stance(t, facets, scaled.low[t][facets], scaled.high[t][facets])
+            if (stance.lo <= stance.hi).all():
+                found = solve_step(scaled, stance)
+                y[t, k] = found.y
+                if found.status != INFEASIBLE:
+                    costs[t, k] = found.bound
+    return costs, y
 
 
 def window_costs(scaled: ScaledTask) -> Array:

@@ -4,10 +4,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from expert.contact.box import pushes
 from expert.contact.plans import contact_forces, plan_cost, wrench_residual
 from expert.contact.scaled import ScaledTask
-from expert.contact.sequence import Sequence, smoothing
+from expert.contact.sequence import Sequence, fixed, pushes, smoothing
 from expert.contact.steps import rays_per_end, solve_step
 from expert.errors import SolverFailed
 from expert.geometry.pose import Array
@@ -36,12 +35,11 @@ def forces_at(scaled: ScaledTask, sequence: Sequence, z: Array) -> Forces:
     weights = np.zeros((T, 3 * C + scaled.rays.shape[1]))
     total = smoothing(sequence, z)
     for t in range(T):
-        on = pushes(sequence, t)
-        status, cost, _, _, x = solve_step(scaled, t, sequence.facet[on], z[on], z[on])
-        if status != SOLVED:
+        found = solve_step(scaled, fixed(sequence, t, z))
+        if found.status != SOLVED:
             return Forces(np.inf, weights)
-        total += cost
-        weights[t, : x.size] = np.maximum(x, 0.0)
+        total += found.cost
+        weights[t, : found.x.size] = np.maximum(found.x, 0.0)
     return Forces(total, weights)
 
 

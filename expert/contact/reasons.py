@@ -24,7 +24,7 @@ def why_infeasible(task: ContactTask, scaled: ScaledTask, phi: Array) -> str:
 
 
 def _balanced(scaled: ScaledTask, fingers: int) -> bool:
-    return bool(np.isfinite(step_costs(scaled, fingers)).any(axis=1).all())
+    return bool(np.isfinite(step_costs(scaled, fingers).cost).any(axis=1).all())
 
 
 def _more_fingers(scaled: ScaledTask, count: int) -> list[str]:

@@ -24,6 +24,10 @@ QP_ITERATIONS = 400
 """Changes of the active set after which the compiled QP solver hands over to others."""
 
 
+FREE_FORCES = 1e4
+"""Weight of squared accelerations where forces cost nothing."""
+
+
 class ScaledTask(NamedTuple):
     """Data of Thesis 3.1.2 for models and compiled code.  t step, f facet, e ray of the environment, g group of rays, h half-plane.
 
@@ -33,6 +37,7 @@ class ScaledTask(NamedTuple):
     required (T, 3): wrench that fingers and reactions together exert; rays (T, E, 3) wrenches of the environment, group (T, E) of each,
     -1 for none; limit (T, G) of each group's sum.
     walls (W, 3): n.x >= d;  region (T, R, H, 3): a.x <= b, padded with 0.x <= 1.
+    cost_unit: cost [SI] of a unit; forces weigh 1, or accelerations FREE_FORCES where forces cost nothing.
     friction is the share of true_friction that is planned with; margin_weight times mu lambda_n - |lambda_t| (true mu) is
     the reward for the distance from the cone's edge (beta).
     parking (2,): where a finger that never touches waits; nan: nowhere stays free all the time.
@@ -61,6 +66,7 @@ class ScaledTask(NamedTuple):
     true_friction: float
     max_force: float
     min_force: float
+    cost_unit: float
     force_weight: float
     acceleration_weight: float
     margin_weight: float
@@ -70,7 +76,7 @@ class ScaledTask(NamedTuple):
 
     @classmethod
     def of(cls, task: ContactTask) -> "ScaledTask":
-        """Scale the task: lengths by L, forces by m g, the cost by 1 / (m g)^2."""
+        """Scale the task: lengths by L, forces by m g."""
         L, weight = task.body.size, task.weight
         poses = task.trajectory.poses
         origin = poses[0, :2].copy()
@@ -103,9 +109,7 @@ class ScaledTask(NamedTuple):
             true_friction=mu,
             max_force=task.fingers.max_force / weight,
             min_force=task.robustness.min_normal_force / weight,
-            force_weight=task.cost.force,
-            acceleration_weight=task.cost.acceleration * (L / task.trajectory.dt**2 / weight) ** 2,
-            margin_weight=task.cost.margin / weight / np.hypot(1, mu),
+            **_cost_weights(task),
             min_interval=task.robustness.min_interval,
             workspace=(workspace(task) - origin) / L,
             iterations=QP_ITERATIONS,
@@ -125,6 +129,27 @@ class ScaledTask(NamedTuple):
     def regions(self) -> int:
         """R."""
         return self.region.shape[1]
+
+
+def _cost_weights(task: ContactTask) -> dict[str, float]:
+    """Unit of cost and weights of forces, accelerations and distances from the cones' edges (Thesis 3.1.4)."""
+    unit = cost_unit(task)
+    per_length = task.body.size / task.trajectory.dt**2
+    return {
+        "cost_unit": unit,
+        "force_weight": task.cost.force * task.weight**2 / unit,
+        "acceleration_weight": task.cost.acceleration * per_length**2 / unit,
+        "margin_weight": task.cost.margin * task.weight / unit / np.hypot(1, task.fingers.friction),
+    }
+
+
+def cost_unit(task: ContactTask) -> float:
+    """Cost [SI] that counts as 1: numbers of ordinary size, whatever the weights' common factor."""
+    if task.cost.force > 0:
+        return task.cost.force * task.weight**2
+    if task.cost.acceleration > 0:
+        return task.cost.acceleration * (task.body.size / task.trajectory.dt**2) ** 2 / FREE_FORCES
+    return task.weight**2
 
 
 def _from(origin: Array, rows: Array) -> Array:

@@ -5,14 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from expert.contact.scaled import ScaledTask
+from expert.contact.steps import Stance
 from expert.geometry.pose import Array
-from expert.numeric.qp import INFEASIBLE, SOLVED, compiled, solve_qp
+from expert.numeric.qp import compiled, inlined
 from expert.world.values import IntArray
-
-FAR = 10.0
-"""Free fingers are sought within this distance of the workspace [L]."""
-FLAT = 1e-8
-"""Curvature, relative to the smoothing weight, that holds directions without any cost near a reference."""
 
 
 class Sequence(NamedTuple):
@@ -41,9 +37,20 @@ class Sequence(NamedTuple):
 @compiled
 def sequence_of(scaled: ScaledTask, modes: IntArray) -> Sequence:
     """Number the variables and add up the smoothing cost (backward second differences from the third step on)."""
+    interval, facet = intervals_of(modes)
+    lo, hi = ranges_of(scaled, modes, interval, facet.size)
+    free, n = free_variables(scaled, modes, facet.size)
+    offset, map = positions_of(scaled, modes, interval, free, n)
+    Q, q, q0 = smoothing_form(scaled, offset, map)
+    reference = _reference(scaled, modes, free, lo, hi, n)
+    return Sequence(modes, interval, free, facet, lo, hi, n, offset, map, Q, q, q0, reference)
+
+
+@inlined
+def intervals_of(modes: IntArray) -> tuple[IntArray, IntArray]:
+    """Contact interval (S, C) of each step and finger or -1, and the facet (K,) of each interval: rho is one number in it (3-CT5)."""
     S, C = modes.shape
-    interval, free = np.full((S, C), -1), np.full((S, C), -1)
-    facet, lo, hi = np.empty(S * C, np.int64), np.zeros(S * C), np.ones(S * C)
+    interval, facet = np.full((S, C), -1), np.empty(S * C, np.int64)
     K = 0
     for c in range(C):
         for t in range(S):
@@ -53,15 +60,40 @@ def sequence_of(scaled: ScaledTask, modes: IntArray) -> Sequence:
                     facet[K] = f
                     K += 1
                 interval[t, c] = K - 1
-                lo[K - 1] = max(lo[K - 1], scaled.low[t, f])
-                hi[K - 1] = min(hi[K - 1], scaled.high[t, f])
-    n = K
-    for c in range(C):
+    return interval, facet[:K].copy()
+
+
+@inlined
+def ranges_of(scaled: ScaledTask, modes: IntArray, interval: IntArray, count: int) -> tuple[Array, Array]:
+    """Range of rho (K,) that margins and walls leave at every step of an interval."""
+    lo, hi = np.zeros(count), np.ones(count)
+    for t in range(modes.shape[0]):
+        for c in range(modes.shape[1]):
+            k, f = interval[t, c], modes[t, c]
+            if k >= 0:
+                lo[k], hi[k] = max(lo[k], scaled.low[t, f]), min(hi[k], scaled.high[t, f])
+    return lo, hi
+
+
+@inlined
+def free_variables(scaled: ScaledTask, modes: IntArray, first: int) -> tuple[IntArray, int]:
+    """Two variables for each free position, from `first` on (-1: none), and the number of all variables."""
+    free, n = np.full(modes.shape, -1), first
+    for c in range(modes.shape[1]):
         if np.isnan(scaled.parking[0]) or (modes[:, c] >= 0).any():
-            for t in range(S):
+            for t in range(modes.shape[0]):
                 if modes[t, c] < 0:
                     free[t, c] = n
                     n += 2
+    return free, n
+
+
+@inlined
+def positions_of(
+    scaled: ScaledTask, modes: IntArray, interval: IntArray, free: IntArray, n: int
+) -> tuple[Array, Array]:
+    """Positions as offset (S, C, 2) + map (S, C, 2, n) z: on the facet (3-CT3), free, or parked."""
+    S, C = modes.shape
     offset, map = np.zeros((S, C, 2)), np.zeros((S, C, 2, n))
     for t in range(S):
         for c in range(C):
@@ -74,26 +106,31 @@ def sequence_of(scaled: ScaledTask, modes: IntArray) -> Sequence:
                 map[t, c, 1, free[t, c] + 1] = 1.0
             else:
                 offset[t, c] = scaled.parking
+    return offset, map
+
+
+@inlined
+def smoothing_form(scaled: ScaledTask, offset: Array, map: Array) -> tuple[Array, Array, float]:
+    """Q, q, q0 of the smoothing cost |p_ddot|^2 = z'Qz/2 + q'z + q0 (Thesis 3.1.4)."""
+    S, C, _, n = map.shape
     Q, q, q0 = np.zeros((n, n)), np.zeros(n), 0.0
-    row = np.zeros(n)
+    row, weight = np.zeros(n), 2 * scaled.acceleration_weight
     for c in range(C):
         for t in range(2, S):
             for d in range(2):
                 constant = offset[t, c, d] - 2 * offset[t - 1, c, d] + offset[t - 2, c, d]
                 for k in range(n):
                     row[k] = map[t, c, d, k] - 2 * map[t - 1, c, d, k] + map[t - 2, c, d, k]
-                weight = 2 * scaled.acceleration_weight
                 for i in range(n):
                     if row[i] != 0.0:
                         q[i] += weight * row[i] * constant
                         for j in range(n):
                             Q[i, j] += weight * row[i] * row[j]
                 q0 += 0.5 * weight * constant * constant
-    reference = _reference(scaled, modes, free, lo[:K], hi[:K], n)
-    return Sequence(modes, interval, free, facet[:K], lo[:K], hi[:K], n, offset, map, Q, q, q0, reference)
+    return Q, q, q0
 
 
-@compiled
+@inlined
 def _reference(scaled: ScaledTask, modes: IntArray, free: IntArray, lo: Array, hi: Array, n: int) -> Array:
     """Where flat directions are held: mid-range rho; free fingers beside the middle of the nearest facet they touch."""
     z = np.zeros(n)
@@ -115,121 +152,48 @@ def _reference(scaled: ScaledTask, modes: IntArray, free: IntArray, lo: Array, h
 
 
 @compiled
+def pushes(sequence: Sequence, t: int) -> IntArray:
+    """Intervals whose finger may push at t: those that go on (alternated sticking, 3-CT5), all at the last step."""
+    S, C = sequence.modes.shape
+    out, n = np.empty(C, np.int64), 0
+    for c in range(C):
+        k = sequence.interval[t, c]
+        if k >= 0 and (t == S - 1 or sequence.interval[t + 1, c] == k):
+            out[n] = k
+            n += 1
+    return out[:n]
+
+
+@compiled
+def fixed(sequence: Sequence, t: int, z: Array) -> Stance:
+    """Who pushes at t, at the places in z."""
+    on = pushes(sequence, t)
+    return Stance(t, sequence.facet[on], z[on], z[on])
+
+
+@compiled
+def ranging(sequence: Sequence, t: int, lo: Array, hi: Array) -> Stance:
+    """Who pushes at t, with every rho in its range."""
+    on = pushes(sequence, t)
+    return Stance(t, sequence.facet[on], lo[on], hi[on])
+
+
+@compiled
 def smoothing(sequence: Sequence, z: Array) -> float:
     """Smoothing cost at z."""
     return float(0.5 * z @ (sequence.Q @ z) + sequence.q @ z + sequence.q0)
 
 
 @compiled
-def standing_rows(
-    scaled: ScaledTask, sequence: Sequence, lo: Array, hi: Array, assigned: IntArray, width: int
-) -> tuple[Array, Array]:
-    """Rows A z >= b of `width` columns: rho in [lo, hi], free fingers clear of walls and in their assigned regions.
-
-    assigned (S, C): region of a free finger (Thesis 3-CT7), -1 where none is imposed yet.
-    """
-    S, C = sequence.modes.shape
-    K, W, H = lo.size, len(scaled.walls), scaled.region.shape[2]
-    loose = assigned_count = 0
-    for t in range(S):
+def accelerations(sequence: Sequence, z: Array) -> Array:
+    """Backward second differences (max(S - 2, 0), C, 2) of the positions at z."""
+    S, C, _, n = sequence.map.shape
+    out = np.zeros((max(S - 2, 0), C, 2))
+    for t in range(2, S):
         for c in range(C):
-            if sequence.free[t, c] >= 0:
-                loose += 1
-                assigned_count += assigned[t, c] >= 0
-    m = 2 * K + loose * W + assigned_count * H
-    A, b = np.zeros((m, width)), np.zeros(m)
-    for k in range(K):
-        A[2 * k, k], b[2 * k] = 1.0, lo[k]
-        A[2 * k + 1, k], b[2 * k + 1] = -1.0, -hi[k]
-    i = 2 * K
-    for t in range(S):
-        for c in range(C):
-            v = sequence.free[t, c]
-            if v < 0:
-                continue
-            for w in range(W):
-                A[i, v], A[i, v + 1], b[i] = scaled.walls[w, 0], scaled.walls[w, 1], scaled.walls[w, 2]
-                i += 1
-            if assigned[t, c] >= 0:
-                for h in range(H):
-                    row = scaled.region[t, assigned[t, c], h]
-                    A[i, v], A[i, v + 1], b[i] = -row[0], -row[1], -row[2]
-                    i += 1
-    return A, b
-
-
-@compiled
-def least_over_box(scaled: ScaledTask, z: Array, slope: Array, lo: Array, hi: Array) -> float:
-    """min over the box of slope.(x - z): what a convex function with this gradient at z can still fall by."""
-    fall = 0.0
-    for k in range(z.size):
-        d = (k - lo.size) % 2
-        low = lo[k] if k < lo.size else scaled.workspace[0, d] - FAR
-        high = hi[k] if k < lo.size else scaled.workspace[1, d] + FAR
-        fall += min(slope[k] * (low - z[k]), slope[k] * (high - z[k]))
-    return fall
-
-
-@compiled
-def least_smoothing(scaled: ScaledTask, modes: IntArray, assigned: IntArray) -> tuple[float, int]:
-    """Lower bound of the smoothing cost of one finger's modes (S, 1) with its regions (inf: no room), and the step to
-    branch on: where the finger is deepest inside the object, -1 if nowhere."""
-    s = sequence_of(scaled, modes)
-    if (s.lo > s.hi).any():
-        return np.inf, -1
-    if s.size == 0:
-        return s.q0, -1
-    A, b = standing_rows(scaled, s, s.lo, s.hi, assigned, s.size)
-    ridge = FLAT * (1 + scaled.acceleration_weight)
-    H = s.Q + ridge * np.eye(s.size)
-    status, z, u = solve_qp(H, s.q - ridge * s.reference, A, b, np.int64(0), scaled.iterations)
-    slope, bound = s.Q @ z + s.q, smoothing(s, z)
-    if status == INFEASIBLE:
-        slope[:], bound = 0.0, 0.0
-    for i in range(b.size):
-        weight = max(u[i], 0.0)
-        bound += weight * b[i]
-        for j in range(z.size):
-            slope[j] -= weight * A[i, j]
-            if status == SOLVED:
-                bound -= weight * A[i, j] * z[j]
-    if status == INFEASIBLE:
-        z[:] = 0.0
-    bound += least_over_box(scaled, z, slope, s.lo, s.hi)
-    if status == INFEASIBLE and bound > 1e-12 * np.abs(u).max() * (1 + np.abs(b).max()) * b.size:
-        return np.inf, -1
-    if status != SOLVED:
-        return 0.0, -1
-    t, _, _ = worst_intrusion(scaled, s, z, assigned)
-    return max(0.0, bound), t
-
-
-@compiled
-def worst_intrusion(
-    scaled: ScaledTask, sequence: Sequence, z: Array, assigned: IntArray
-) -> tuple[int, int, float]:
-    """Step, finger and depth of the free finger deepest outside all regions; depth 0: all are outside the object."""
-    worst_t, worst_c, worst = -1, -1, 1e-9
-    S, C = sequence.modes.shape
-    for t in range(S):
-        for c in range(C):
-            v = sequence.free[t, c]
-            if v >= 0 and assigned[t, c] < 0:
-                _, depth = nearest_region(scaled, t, z[v], z[v + 1])
-                if depth > worst:
-                    worst_t, worst_c, worst = t, c, depth
-    return worst_t, worst_c, worst if worst_t >= 0 else 0.0
-
-
-@compiled
-def nearest_region(scaled: ScaledTask, t: int, x: float, y: float) -> tuple[int, float]:
-    """Region that a point misses by least, and by how much (<= 0: inside)."""
-    best, least = -1, np.inf
-    for r in range(scaled.region.shape[1]):
-        miss = -np.inf
-        for h in range(scaled.region.shape[2]):
-            row = scaled.region[t, r, h]
-            miss = max(miss, row[0] * x + row[1] * y - row[2])
-        if miss < least:
-            best, least = r, miss
-    return best, least
+            for d in range(2):
+                for u, weight in ((t, 1.0), (t - 1, -2.0), (t - 2, 1.0)):
+                    out[t - 2, c, d] += weight * sequence.offset[u, c, d]
+                    for k in range(n):
+                        out[t - 2, c, d] += weight * sequence.map[u, c, d, k] * z[k]
+    return out

@@ -1,11 +1,12 @@
 """One time step: least force cost with given facets active, exact wrench cones, and bounds that duality makes safe.
 
 A finger on a facet with rho in [lo, hi] exerts every wrench of the cone spanned by its friction rays at both ends, and
-no other: with w = rho lambda_n the cone is convex (Thesis 3-CT2 to 3-CT4 without an envelope).  For any multipliers y of
-the wrench balance, D(y) = y.required - max_environment - sum_c max_finger is a lower bound of the step's cost, evaluated
-in closed form; the tolerance of the program's solver therefore never enters a bound.  All quantities are without
-dimension, see `scaled`.
+no other: with w = rho lambda_n the cone is convex (the products of 3-CT2 without the envelopes of 3-CT8 and 3-CT9).  For any
+multipliers y of the wrench balance, D(y) = y.required - max_environment - sum_c max_finger is a lower bound of the step's
+cost, evaluated in closed form; the tolerance of the program's solver therefore never enters a bound.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,10 +17,30 @@ from expert.world.values import IntArray
 
 RIDGE = 1e-9
 """Curvature given to reactions and to doubly described forces, in units of 1 / (m g)^2: reactions cost nothing."""
-CERTIFICATES, BISECTIONS = 4, 10
-"""Steps by either means towards the end of a range of rho."""
 CERTAIN = 1e-9
 """An infeasible step must miss its required wrench by this much [m g, m g L] for multipliers of length one."""
+
+
+class Stance(NamedTuple):
+    """Facets (n,) that are pushed at step t, and the ranges lo <= rho <= hi of the fingers' places, (n,) each."""
+
+    t: int
+    facets: IntArray
+    lo: Array
+    hi: Array
+
+
+class Balance(NamedTuple):
+    """status, cost reached, certified lower bound, multipliers y (3,) of the wrench balance, ray weights x.
+
+    status INFEASIBLE only where y proves it, which `shortfall` confirms; FAILED leaves the bound of y = 0 and no more.
+    """
+
+    status: int
+    cost: float
+    bound: float
+    y: Array
+    x: Array
 
 
 @compiled
@@ -34,7 +55,7 @@ def seen(scaled: ScaledTask, t: int, f: int, rho: float, y: Array) -> tuple[floa
 
 @compiled
 def gain(scaled: ScaledTask, t: int, f: int, rho: float, y: Array) -> float:
-    """h(rho) = max over the friction cone of y.wrench - |lambda|^2 + margin term.  Convex in rho."""
+    """h(rho) = max over the friction cone of y.wrench - |lambda|^2 + margin term (beta).  Convex in rho."""
     zn, zt = seen(scaled, t, f, rho, y)
     mu, weight = scaled.friction, scaled.force_weight
     zn, zt = zn + scaled.margin_weight * scaled.true_friction, max(abs(zt) - scaled.margin_weight, 0.0)
@@ -55,7 +76,7 @@ def reach(scaled: ScaledTask, t: int, f: int, rho: float, y: Array) -> float:
 
 @compiled
 def environment_reach(scaled: ScaledTask, t: int, y: Array) -> float:
-    """max over what walls and support can exert of y.wrench."""
+    """max over what walls and support can exert of y.wrench (3-CT6)."""
     total, group, best = 0.0, -1, 0.0
     for e in range(scaled.rays.shape[1]):
         g = scaled.group[t, e]
@@ -73,22 +94,36 @@ def environment_reach(scaled: ScaledTask, t: int, y: Array) -> float:
 
 
 @compiled
-def cost_bound(scaled: ScaledTask, t: int, facets: IntArray, lo: Array, hi: Array, y: Array) -> float:
-    """D(y): no wrench balance with these facets costs less."""
+def cost_bound(scaled: ScaledTask, stance: Stance, y: Array) -> float:
+    """D(y): no wrench balance of this stance costs less."""
+    t, facets, lo, hi = stance
     bound = scaled.required[t] @ y - environment_reach(scaled, t, y)
     for i in range(facets.size):
-        low, high = gain(scaled, t, facets[i], lo[i], y), gain(scaled, t, facets[i], hi[i], y)
-        bound -= max(low, high)
+        bound -= max(gain(scaled, t, facets[i], lo[i], y), gain(scaled, t, facets[i], hi[i], y))
     return bound
 
 
 @compiled
-def shortfall(scaled: ScaledTask, t: int, facets: IntArray, lo: Array, hi: Array, y: Array) -> float:
-    """Positive: no wrench balance exists with these facets, and y proves it."""
+def shortfall(scaled: ScaledTask, stance: Stance, y: Array) -> float:
+    """Positive: no wrench balance of this stance exists, and y proves it."""
+    t, facets, lo, hi = stance
     miss = scaled.required[t] @ y - environment_reach(scaled, t, y)
     for i in range(facets.size):
         miss -= max(reach(scaled, t, facets[i], lo[i], y), reach(scaled, t, facets[i], hi[i], y))
     return miss
+
+
+class StepProgram(NamedTuple):
+    """min x'Hx/2 + g'x over ray weights x: A x = b in the first three rows, the wrench balance; A x >= b in the others,
+    which are x >= 0, then the limits of each finger's normal force, then those of each group of reactions.
+
+    Rays: those of each finger at lo, and at hi where that differs; then the environment's.
+    """
+
+    H: Array
+    g: Array
+    A: Array
+    b: Array
 
 
 @compiled
@@ -98,157 +133,130 @@ def rays_per_end(scaled: ScaledTask) -> int:
 
 
 @compiled
-def step_program(
-    scaled: ScaledTask, t: int, facets: IntArray, lo: Array, hi: Array
-) -> tuple[Array, Array, Array, Array]:
-    """H, g, A, b of the step's program over ray weights x >= 0: the wrench balance, x >= 0, limits of force.
-
-    Rays: those of each finger at lo, and at hi where that differs; then the environment's.
-    """
-    each = rays_per_end(scaled)
-    count = 0
+def step_program(scaled: ScaledTask, stance: Stance) -> StepProgram:
+    """Least cost of forces that balance a step with every rho in its range (3-CT1 to 3-CT4, 3-CT6)."""
+    t, facets, lo, hi = stance
+    each, count = rays_per_end(scaled), 0
     for i in range(facets.size):
         count += each if lo[i] == hi[i] else 2 * each
-    env, groups = 0, 0
-    while env < scaled.rays.shape[1] and scaled.group[t, env] >= 0:
-        groups = scaled.group[t, env] + 1
-        env += 1
-    n = count + env
-    limits = facets.size * (2 if scaled.min_force > 0 else 1)
-    m = 3 + n + limits + groups
-    H, g, A, b = np.zeros((n, n)), np.zeros(n), np.zeros((m, n)), np.zeros(m)
-    force = np.zeros((2, n))
+    reactions, groups = environment_size(scaled, t)
+    n = count + reactions
+    rows = 3 + n + facets.size * (2 if scaled.min_force > 0 else 1) + groups
+    H, A, b = np.zeros((n, n)), np.zeros((rows, n)), np.zeros(rows)
+    program = StepProgram(H, np.zeros(n), A, b)
+    b[:3] = scaled.required[t]
     k, row = 0, 3 + n
     for i in range(facets.size):
-        f, first = facets[i], k
-        normal, tangent = scaled.normal[t, f], scaled.tangent[t, f]
-        for end in range(1 if lo[i] == hi[i] else 2):
-            rho = lo[i] if end == 0 else hi[i]
-            dx = scaled.arm[t, f, 0] + rho * scaled.edge[t, f, 0]
-            dy = scaled.arm[t, f, 1] + rho * scaled.edge[t, f, 1]
-            for j in range(each):
-                slope = (scaled.friction, -scaled.friction, 0.0)[j]
-                fx, fy = normal[0] + slope * tangent[0], normal[1] + slope * tangent[1]
-                force[0, k], force[1, k] = fx, fy
-                A[0, k], A[1, k], A[2, k] = fx, fy, dx * fy - dy * fx
-                g[k] = -scaled.margin_weight * (scaled.true_friction - abs(slope))
-                k += 1
-        for p in range(first, k):
-            for q in range(first, k):
-                H[p, q] = 2 * scaled.force_weight * (force[0, p] * force[0, q] + force[1, p] * force[1, q])
-        A[row, first:k], b[row] = -1.0, -scaled.max_force
-        row += 1
-        if scaled.min_force > 0:
-            A[row, first:k], b[row] = 1.0, scaled.min_force
-            row += 1
-    for e in range(env):
-        for d in range(3):
-            A[d, count + e] = scaled.rays[t, e, d]
-        A[row + scaled.group[t, e], count + e] = -1.0
-    for p in range(groups):
-        b[row + p] = -scaled.limit[t, p]
+        first, k = k, add_rays(scaled, program, t, facets[i], lo[i], k)
+        if hi[i] != lo[i]:
+            k = add_rays(scaled, program, t, facets[i], hi[i], k)
+        row = add_finger(scaled, program, first, k, row)
+    add_environment(scaled, program, t, count, row)
     for k in range(n):
         H[k, k] += RIDGE
         A[3 + k, k] = 1.0
-    b[:3] = scaled.required[t]
-    return H, g, A, b
+    return program
 
 
 @compiled
-def solve_step(
-    scaled: ScaledTask, t: int, facets: IntArray, lo: Array, hi: Array
-) -> tuple[int, float, float, Array, Array]:
-    """Status, cost reached, lower bound, multipliers y (a proof where infeasible), ray weights x.
+def environment_size(scaled: ScaledTask, t: int) -> tuple[int, int]:
+    """Rays and groups of the environment at step t."""
+    rays, groups = 0, 0
+    while rays < scaled.rays.shape[1] and scaled.group[t, rays] >= 0:
+        groups = scaled.group[t, rays] + 1
+        rays += 1
+    return rays, groups
 
-    INFEASIBLE only with a proof that `shortfall` confirms; FAILED leaves the bound of y = 0 and no more.
+
+@compiled
+def add_rays(scaled: ScaledTask, program: StepProgram, t: int, f: int, rho: float, k: int) -> int:
+    """Columns of a finger's rays at rho, from column k on; returns the next column."""
+    _, g, A, _ = program
+    normal, tangent = scaled.normal[t, f], scaled.tangent[t, f]
+    dx = scaled.arm[t, f, 0] + rho * scaled.edge[t, f, 0]
+    dy = scaled.arm[t, f, 1] + rho * scaled.edge[t, f, 1]
+    for j in range(rays_per_end(scaled)):
+        slope = (scaled.friction, -scaled.friction, 0.0)[j]
+        fx, fy = normal[0] + slope * tangent[0], normal[1] + slope * tangent[1]
+        A[0, k], A[1, k], A[2, k] = fx, fy, dx * fy - dy * fx
+        g[k] = -scaled.margin_weight * (scaled.true_friction - abs(slope))
+        k += 1
+    return k
+
+
+@compiled
+def add_finger(scaled: ScaledTask, program: StepProgram, first: int, last: int, row: int) -> int:
+    """|lambda|^2 of the finger with columns first to last, and the limits of its normal force; returns the next row.
+
+    Where the margin is rewarded, (lambda_t^2 + s^2) / 2 stands for lambda_t^2, with s the sum of the tangential parts of all rays
+    without their signs: it is |lambda_t| at the optimum, since less of it earns more.  Without that, weights of the
+    three rays could run off along a direction with a slope and no curvature.
     """
-    H, g, A, b = step_program(scaled, t, facets, lo, hi)
+    H, _, A, b = program
+    rewarded = scaled.margin_weight > 0
+    for p in range(first, last):
+        for q in range(first, last):
+            square = A[0, p] * A[0, q] + A[1, p] * A[1, q]
+            if rewarded:
+                across = square - 1.0  # rays have unit normal component
+                square = 1.0 + max(across, 0.0)
+            H[p, q] = 2 * scaled.force_weight * square
+    A[row, first:last], b[row] = -1.0, -scaled.max_force
+    if scaled.min_force <= 0:
+        return row + 1
+    A[row + 1, first:last], b[row + 1] = 1.0, scaled.min_force
+    return row + 2
+
+
+@compiled
+def add_environment(scaled: ScaledTask, program: StepProgram, t: int, first: int, row: int) -> None:
+    """Columns of the environment's rays from `first` on, and the limits of its groups in the rows from `row` on."""
+    _, g, A, b = program
+    for e in range(g.size - first):
+        group = scaled.group[t, e]
+        for d in range(3):
+            A[d, first + e] = scaled.rays[t, e, d]
+        A[row + group, first + e] = -1.0
+        b[row + group] = -scaled.limit[t, group]
+
+
+@compiled
+def program_cost(H: Array, g: Array, x: Array) -> float:
+    """x'Hx/2 + g'x without the ridge."""
+    total = 0.0
+    for i in range(g.size):
+        row = -RIDGE * x[i]
+        for j in range(g.size):
+            row += H[i, j] * x[j]
+        total += x[i] * (g[i] + 0.5 * row)
+    return total
+
+
+@compiled
+def solve_step(scaled: ScaledTask, stance: Stance) -> Balance:
+    """The least-cost balance of a stance, or a proof that it has none."""
+    H, g, A, b = step_program(scaled, stance)
     y = np.zeros(3)
     if g.size == 0:
-        size = np.abs(scaled.required[t]).max()
+        size = np.abs(b[:3]).max()
         if size <= CERTAIN:
-            return SOLVED, 0.0, 0.0, y, g
-        y[:] = scaled.required[t] / size
-        return INFEASIBLE, np.inf, np.inf, y, g
+            return Balance(SOLVED, 0.0, 0.0, y, g)
+        y[:] = b[:3] / size
+        return Balance(INFEASIBLE, np.inf, np.inf, y, g)
     status, x, u = solve_qp(H, g, A, b, np.int64(3), scaled.iterations)
     y[:] = u[:3]
     if status == SOLVED:
-        cost = float(0.5 * x @ (H @ x) - 0.5 * RIDGE * (x @ x) + g @ x)
-        trivial = cost_bound(scaled, t, facets, lo, hi, np.zeros(3))
-        return SOLVED, cost, max(trivial, cost_bound(scaled, t, facets, lo, hi, y)), y, x
+        cost, bound = program_cost(H, g, x), cost_bound(scaled, stance, y)
+        if cost - bound > CERTAIN * (1 + abs(cost)):
+            trivial = cost_bound(scaled, stance, np.zeros(3))
+            if trivial > bound:
+                bound, y[:] = trivial, 0.0
+        return Balance(SOLVED, cost, bound, y, x)
     if status == INFEASIBLE:
         length = np.sqrt(y @ y)
         if length > 0:
             y /= length
-            if shortfall(scaled, t, facets, lo, hi, y) > CERTAIN:
-                return INFEASIBLE, np.inf, np.inf, y, x
+            if shortfall(scaled, stance, y) > CERTAIN:
+                return Balance(INFEASIBLE, np.inf, np.inf, y, x)
     y[:] = 0.0
-    return FAILED, np.inf, cost_bound(scaled, t, facets, lo, hi, y), y, x
-
-
-@compiled
-def tighten(scaled: ScaledTask, t: int, facets: IntArray, lo: Array, hi: Array, i: int, end: int) -> bool:
-    """Move lo[i] (end 0) or hi[i] (end 1) in towards the first rho that admits a wrench balance.  False: there is none.
-
-    First by certificates: multipliers that prove one rho hopeless rule out its neighbours too.  Then by bisection: the
-    rho of a convex set of (w, lambda_n) form an interval, so what lies beyond a hopeless rho is hopeless.
-    """
-    low, high = lo.copy(), hi.copy()
-    f = facets[i]
-    far = hi[i] if end == 0 else lo[i]
-    near = lo[i] if end == 0 else hi[i]
-    for _ in range(CERTIFICATES):
-        low[i] = high[i] = near
-        status, _, _, y, _ = solve_step(scaled, t, facets, low, high)
-        if status != INFEASIBLE:
-            return True
-        others = shortfall(scaled, t, facets, low, high, y) + reach(scaled, t, f, near, y) - CERTAIN
-        if reach(scaled, t, f, far, y) < others:
-            return False  # convex in rho: no rho in between reaches it either
-        near = first_reach(scaled, t, f, near, far, y, others)
-        if end == 0:
-            lo[i] = near
-        else:
-            hi[i] = near
-    possible = balanced_rho(scaled, t, facets, lo, hi, i)
-    if possible < 0 or possible == np.inf:
-        return possible < 0
-    for _ in range(BISECTIONS):
-        low[i] = high[i] = 0.5 * (near + possible)
-        if solve_step(scaled, t, facets, low, high)[0] == INFEASIBLE:
-            near = low[i]
-        else:
-            possible = low[i]
-    if end == 0:
-        lo[i] = near
-    else:
-        hi[i] = near
-    return True
-
-
-@compiled
-def balanced_rho(scaled: ScaledTask, t: int, facets: IntArray, lo: Array, hi: Array, i: int) -> float:
-    """The rho of finger i in the least-cost balance over the box; -1: unknown, or any rho will do; inf: none exists."""
-    status, _, _, _, x = solve_step(scaled, t, facets, lo, hi)
-    if status != SOLVED:
-        return np.inf if status == INFEASIBLE else -1.0
-    each, k = rays_per_end(scaled), 0
-    for j in range(i):
-        k += each if lo[j] == hi[j] else 2 * each
-    at_low, at_high = x[k : k + each].sum(), x[k + each : k + 2 * each].sum()
-    if lo[i] == hi[i] or at_low + at_high <= 0:
-        return -1.0
-    return (at_low * lo[i] + at_high * hi[i]) / (at_low + at_high)
-
-
-@compiled
-def first_reach(scaled: ScaledTask, t: int, f: int, rho: float, far: float, y: Array, wanted: float) -> float:
-    """Where `reach`, convex with reach(rho) < wanted <= reach(far), attains `wanted`; never beyond that point."""
-    short, long = rho, far
-    for _ in range(60):
-        middle = 0.5 * (short + long)
-        if reach(scaled, t, f, middle, y) < wanted:
-            short = middle  # convex: nothing between rho and here reaches it
-        else:
-            long = middle
-    return short
+    return Balance(FAILED, np.inf, cost_bound(scaled, stance, y), y, x)

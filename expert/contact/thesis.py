@@ -4,11 +4,10 @@ Its bound and its proofs of infeasibility hold for the exact problem; its plans 
 envelope error, which each plan states as its residual.
 """
 
-import time
-
 import cvxpy as cp
 import numpy as np
 
+from expert.budget import Budget
 from expert.contact.recovery import Found, modes_of, plan_of
 from expert.contact.scaled import ScaledTask
 from expert.contact.thesis_blocks import (
@@ -42,8 +41,8 @@ PLAN_STATUS: dict[str, Status] = {
 def solve(
     task: ContactTask,
     *,
-    gap: float = 1e-3,
-    time_limit: float = 60.0,
+    gap: float,
+    time_limit: float,
     segments: int = 4,
     solver: Solver = "scip",
 ) -> Plan:
@@ -51,14 +50,14 @@ def solve(
 
     Raises SolverFailed where the solver failed numerically: nothing is known then.
     """
-    start = time.perf_counter()
+    budget = Budget(time_limit)
     s = ScaledTask.of(task)
     x = Variables.of(s, task.fingers.count, segments)
     program = cp.Problem(
         cp.Minimize(cost(x, s)), [c for b in blocks(x, s, task, segments) for c in b.constraints]
     )
-    result = solve_program(program, solver=solver, gap=gap, time_limit=time_limit)
-    return _plan(task, s, x, result, segments, time.perf_counter() - start)
+    result = solve_program(program, solver=solver, gap=gap, time_limit=budget.left)
+    return _plan(task, s, x, result, segments, budget.spent)
 
 
 def cost(x: Variables, s: ScaledTask) -> cp.Expression:
@@ -104,7 +103,7 @@ def _plan(
             status=status,
             seconds=seconds,
             nodes=result.nodes,
-            bound=result.bound * s.weight**2,
+            bound=result.bound * s.cost_unit,
             reason=reason,
         )
     error = 2 * task.fingers.count * torque_cells(s, segments).largest_error
@@ -113,7 +112,7 @@ def _plan(
         s,
         point_of(x),
         status=status,
-        bound=result.bound * s.weight**2,
+        bound=result.bound * s.cost_unit,
         seconds=seconds,
         nodes=result.nodes,
         reason=f"torques in McCormick envelopes with {segments} segments: off by up to {error:.2g} m g L",

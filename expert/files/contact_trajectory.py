@@ -40,6 +40,7 @@ ANSWER_KEYS: tuple[str, ...] = (
     "finger_positions",
     "finger_forces",
     "contact_forces",
+    "certificate",
 )
 FORCE_LIMIT = 10
 """Largest force of a finger over m g, where a file states none."""
@@ -98,6 +99,8 @@ def answer_fields(problem: Problem, answer: Plan) -> dict[str, Any]:
     """The plan as plain JSON values, facets and vertices numbered as in the problem file; null where there is none."""
     numbering = Numbering.of(problem.data)
     summary = {**plain_values(answer), "gap": jsonable(answer.gap)}
+    if answer.certificate is not None:
+        summary["certificate"] = answer.certificate
     if not answer.found:
         return summary
     return {
@@ -121,6 +124,7 @@ def answer_fields(problem: Problem, answer: Plan) -> dict[str, Any]:
 def read_answer(problem: Problem, file: Section) -> Plan:
     """The plan of a solution file, checked for form (its truth is what `expert.verify` checks).  Raises InvalidProblem."""
     summary, task, numbering = file.values(Plan), problem.task, Numbering.of(problem.data)
+    summary["certificate"] = _read_certificate(file)
     if summary["status"] not in ("optimal", "feasible"):
         return Plan(**summary)
     shape = (task.steps, task.fingers.count, 2)
@@ -134,6 +138,16 @@ def read_answer(problem: Problem, file: Section) -> Plan:
             for section in file.sections("contact_forces", ("step", "vertex", "wall", "point", "force"))
         ),
     )
+
+
+def _read_certificate(file: Section) -> dict[str, Any] | None:
+    """As it is: what it proves is the checker's business."""
+    if "certificate" not in file:
+        return None
+    found = file.take("certificate", "a mapping")
+    if not isinstance(found, dict):
+        raise InvalidProblem(file.path("certificate"), expected="a mapping", got=shorten(found))
+    return found
 
 
 def _read_modes(file: Section, shape: tuple[int, int], facets: int) -> IntArray:

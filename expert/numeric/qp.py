@@ -1,26 +1,23 @@
 """Small dense quadratic programs: minimise x'Hx/2 + g'x subject to A x = b (first rows), A x >= b (the rest).
 
 The fast path is the dual active-set method of Goldfarb and Idnani (1983), compiled.  Whatever it cannot settle goes to
-DAQP, PIQP and Clarabel in turn; only a certificate makes a program infeasible, and nothing at all makes a failure so.
+Clarabel (`fallback`); only a certificate makes a program infeasible, and nothing at all makes a failure so.
 """
 
-import clarabel
-import daqp
+from typing import NamedTuple
+
 import numpy as np
-import piqp
-import scipy.sparse
 from numba import njit, objmode
 
 from expert.geometry.pose import Array
+from expert.numeric.fallback import FAILED, FEASIBILITY, INFEASIBLE, SOLVED, fallback
 from expert.world.values import IntArray
 
 compiled = njit(cache=True, error_model="numpy")
 """Decorator of all compiled code of the solver."""
-SOLVED, INFEASIBLE, FAILED = 0, 1, 2
+inlined = njit(cache=True, error_model="numpy", inline="always")
+"""Decorator of parts of compiled functions: written into their callers, for passing bundles of arrays takes time."""
 BoolArray = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
-
-FEASIBILITY = 1e-10
-"""Largest violation of a constraint, in the program's own (non-dimensional) units."""
 
 
 @compiled
@@ -39,77 +36,120 @@ def solve_qp(
     return status, x, u
 
 
+class Active(NamedTuple):
+    """State of the dual active-set method: with L the Cholesky factor of H, J spans L^-T and R is J' times the active rows.
+
+    rows (n,): active constraints, equalities first; dual (n,): their multipliers; sign (m,): -1 where an equality is met from above;
+    in_use (m,): rows that are active, or equalities.  filled (2,): active rows, those among them that are equalities.
+    x (n,): minimiser on the active rows.
+    """
+
+    J: Array
+    R: Array
+    rows: IntArray
+    dual: Array
+    sign: Array
+    in_use: BoolArray
+    filled: IntArray
+    x: Array
+
+
+class Direction(NamedTuple):
+    """For a new row: d = J'row, step z of x and r of the multipliers, each (n,)."""
+
+    d: Array
+    z: Array
+    r: Array
+
+
 @compiled
 def goldfarb_idnani(
     H: Array, g: Array, A: Array, b: Array, equalities: int, iterations: int
 ) -> tuple[int, Array, Array]:
     """The dual active-set method; FAILED after `iterations` changes of the active set or when H is not definite."""
     n, m = g.size, b.size
-    u = np.zeros(m)
-    J = _inverse_cholesky(H)  # rows j: columns of L^-T
-    x = np.zeros(n)
-    if J[0, 0] == 0.0:
-        return FAILED, x, u
-    _steepest_start(J, g, x)
-    R, d, r, z = np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros(n)
-    active, dual, flipped = np.zeros(n, np.int64), np.zeros(n), np.ones(m)
-    in_use = np.zeros(m, np.bool_)
-    q, fixed = 0, 0  # active constraints; those among them that are equalities
-    for p in range(m):
-        in_use[p] = p < equalities
-    next_equality = 0
-    for _ in range(iterations):
-        if next_equality < equalities:
-            p = next_equality
-            next_equality += 1
-            s = A[p] @ x - b[p]
-            flipped[p] = -1.0 if s > 0 else 1.0
+    a = _start(H, g, m, equalities)
+    if a.J[0, 0] == 0.0:
+        return FAILED, a.x, np.zeros(m)
+    way = Direction(np.zeros(n), np.zeros(n), np.zeros(n))
+    for i in range(iterations):
+        if i < equalities:
+            p, s = i, A[i] @ a.x - b[i]
+            a.sign[p] = -1.0 if s > 0 else 1.0
             s = -abs(s)
         else:
-            p, s = _most_violated(A, b, x, in_use, equalities)
+            p, s = _most_violated(A, b, a, equalities)
             if p < 0:
-                _refine(J, R, A, b, active, flipped, x, q)
-                for k in range(q):
-                    u[active[k]] = dual[k] * flipped[active[k]]
-                return SOLVED, x, u
-        multiplier = 0.0
-        while True:
-            full, squared = _directions(J, R, A[p], flipped[p], q, d, z, r)
-            dependent = squared <= 1e-20 * full
-            drop, t1 = _first_blocking(dual, r, fixed, q)
-            t2 = np.inf if dependent else -s / squared
-            t = min(t1, t2)
-            if t == np.inf:
-                if p < equalities and s >= -FEASIBILITY:
-                    break  # an equality that the others imply
-                u[p] = flipped[p]
-                for k in range(q):
-                    u[active[k]] = -r[k] * flipped[active[k]]
-                return INFEASIBLE, x, u
-            for k in range(q):
-                dual[k] -= t * r[k]
-            multiplier += t
-            if not dependent:
-                for i in range(n):
-                    x[i] += t * z[i]
-                s += t * squared
-            if t2 <= t1:
-                if q >= n:
-                    return FAILED, x, u
-                _append(J, R, d, q, n)
-                active[q], dual[q] = p, multiplier
-                in_use[p] = True
-                q += 1
-                if p < equalities:
-                    fixed = q
-                break
-            in_use[active[drop]] = False
-            _remove(J, R, active, dual, drop, q, n)
-            q -= 1
-    return FAILED, x, u
+                _refine(a, A, b)
+                return SOLVED, a.x, _multipliers(a, a.dual)
+        status = _add(a, way, A[p], p, s, equalities)
+        if status == INFEASIBLE:
+            u = _multipliers(a, -way.r)
+            u[p] = a.sign[p]
+            return INFEASIBLE, a.x, u
+        if status == FAILED:
+            break
+    return FAILED, a.x, np.zeros(m)
 
 
-@compiled
+@inlined
+def _start(H: Array, g: Array, rows: int, equalities: int) -> Active:
+    """No active rows; x = -H^-1 g, the minimiser without constraints."""
+    n = g.size
+    J, x = _inverse_cholesky(H), np.zeros(n)  # rows j: columns of L^-T
+    for j in range(n):
+        s = 0.0
+        for i in range(j + 1):
+            s += J[j, i] * g[i]
+        for i in range(j + 1):
+            x[i] -= s * J[j, i]
+    in_use = np.zeros(rows, np.bool_)
+    in_use[:equalities] = True
+    none = np.zeros(n, np.int64)
+    return Active(J, np.zeros((n, n)), none, np.zeros(n), np.ones(rows), in_use, np.zeros(2, np.int64), x)
+
+
+@inlined
+def _add(a: Active, way: Direction, row: Array, p: int, s: float, equalities: int) -> int:
+    """Make row p, violated by -s, active, dropping rows that block the way; INFEASIBLE: no drop makes room for it."""
+    multiplier = 0.0
+    while True:
+        full, squared = _directions(a, way, row, a.sign[p])
+        dependent = squared <= 1e-20 * full
+        drop, t1 = _first_blocking(a, way.r)
+        t2 = np.inf if dependent else -s / squared
+        t = min(t1, t2)
+        if t == np.inf:
+            # an equality that the others imply is no contradiction
+            return SOLVED if p < equalities and s >= -FEASIBILITY else INFEASIBLE
+        for k in range(a.filled[0]):
+            a.dual[k] -= t * way.r[k]
+        multiplier += t
+        if not dependent:
+            for i in range(a.x.size):
+                a.x[i] += t * way.z[i]
+            s += t * squared
+        if t2 <= t1:
+            if a.filled[0] >= a.x.size:
+                return FAILED
+            _append(a, way.d, p, multiplier)
+            if p < equalities:
+                a.filled[1] = a.filled[0]
+            return SOLVED
+        a.in_use[a.rows[drop]] = False
+        _remove(a, drop)
+
+
+@inlined
+def _multipliers(a: Active, dual: Array) -> Array:
+    """Multipliers of all rows from those of the active ones."""
+    u = np.zeros(a.sign.size)
+    for k in range(a.filled[0]):
+        u[a.rows[k]] = dual[k] * a.sign[a.rows[k]]
+    return u
+
+
+@inlined
 def _inverse_cholesky(H: Array) -> Array:
     """L^-1 with H = L L'; entry (0, 0) is zero if H is not positive definite."""
     n = H.shape[0]
@@ -136,88 +176,75 @@ def _inverse_cholesky(H: Array) -> Array:
     return inverse
 
 
-@compiled
-def _steepest_start(J: Array, g: Array, x: Array) -> None:
-    """x = -H^-1 g, the minimiser without constraints."""
-    n = g.size
-    for j in range(n):
-        s = 0.0
-        for i in range(j + 1):
-            s += J[j, i] * g[i]
-        for i in range(j + 1):
-            x[i] -= s * J[j, i]
-
-
-@compiled
-def _most_violated(A: Array, b: Array, x: Array, in_use: BoolArray, equalities: int) -> tuple[int, float]:
+@inlined
+def _most_violated(A: Array, b: Array, a: Active, equalities: int) -> tuple[int, float]:
     worst, least = -1, -FEASIBILITY
     for i in range(equalities, b.size):
-        if not in_use[i]:
+        if not a.in_use[i]:
             s = -b[i]
-            for k in range(x.size):
-                s += A[i, k] * x[k]
+            for k in range(a.x.size):
+                s += A[i, k] * a.x[k]
             if s < least:
                 worst, least = i, s
     return worst, least
 
 
-@compiled
-def _directions(
-    J: Array, R: Array, row: Array, sign: float, q: int, d: Array, z: Array, r: Array
-) -> tuple[float, float]:
+@inlined
+def _directions(a: Active, way: Direction, row: Array, sign: float) -> tuple[float, float]:
     """Primal step z and dual step r for a new constraint; |J'n|^2 and its part outside the active set."""
-    n = row.size
+    n, q = row.size, a.filled[0]
+    d, z, r = way
     full = squared = 0.0
     z[:] = 0.0
     for j in range(n):
         s = 0.0
         for i in range(n):
-            s += J[j, i] * row[i]
+            s += a.J[j, i] * row[i]
         d[j] = sign * s
         full += s * s
         if j >= q:
             squared += s * s
             for i in range(n):
-                z[i] += d[j] * J[j, i]
+                z[i] += d[j] * a.J[j, i]
     for i in range(q - 1, -1, -1):
         s = d[i]
         for j in range(i + 1, q):
-            s -= R[i, j] * r[j]
-        r[i] = s / R[i, i]
+            s -= a.R[i, j] * r[j]
+        r[i] = s / a.R[i, i]
     return full, squared
 
 
-@compiled
-def _first_blocking(dual: Array, r: Array, fixed: int, q: int) -> tuple[int, float]:
+@inlined
+def _first_blocking(a: Active, r: Array) -> tuple[int, float]:
     drop, t1 = -1, np.inf
-    for k in range(fixed, q):
-        if r[k] > 1e-14 and dual[k] / r[k] < t1:
-            drop, t1 = k, max(dual[k], 0.0) / r[k]
+    for k in range(a.filled[1], a.filled[0]):
+        if r[k] > 1e-14 and a.dual[k] / r[k] < t1:
+            drop, t1 = k, max(a.dual[k], 0.0) / r[k]
     return drop, t1
 
 
-@compiled
-def _refine(
-    J: Array, R: Array, A: Array, b: Array, active: IntArray, flipped: Array, x: Array, q: int
-) -> None:
+@inlined
+def _refine(a: Active, A: Array, b: Array) -> None:
     """One step of iterative refinement: the active constraints hold to rounding, not to the method's drift."""
+    q, x = a.filled[0], a.x
     w = np.empty(q)
     for k in range(q):
-        i = active[k]
-        w[k] = flipped[i] * b[i]
+        i = a.rows[k]
+        w[k] = a.sign[i] * b[i]
         for j in range(x.size):
-            w[k] -= flipped[i] * A[i, j] * x[j]
+            w[k] -= a.sign[i] * A[i, j] * x[j]
         for j in range(k):
-            w[k] -= R[j, k] * w[j]
-        w[k] /= R[k, k]
+            w[k] -= a.R[j, k] * w[j]
+        w[k] /= a.R[k, k]
     for k in range(q):
         for j in range(x.size):
-            x[j] += w[k] * J[k, j]
+            x[j] += w[k] * a.J[k, j]
 
 
-@compiled
-def _append(J: Array, R: Array, d: Array, q: int, n: int) -> None:
-    """Rotate d into its first q + 1 entries and make them column q of R."""
+@inlined
+def _append(a: Active, d: Array, p: int, multiplier: float) -> None:
+    """Rotate d into its first q + 1 entries, make them column q of R, and row p active."""
+    J, q, n = a.J, a.filled[0], d.size
     for j in range(n - 1, q, -1):
         if d[j] != 0.0:
             h = np.hypot(d[j - 1], d[j])
@@ -228,13 +255,18 @@ def _append(J: Array, R: Array, d: Array, q: int, n: int) -> None:
                 J[j - 1, i] = c * v + s * w
                 J[j, i] = c * w - s * v
     for i in range(q + 1):
-        R[i, q] = d[i]
+        a.R[i, q] = d[i]
+    a.rows[q], a.dual[q], a.in_use[p] = p, multiplier, True
+    a.filled[0] += 1
 
 
-@compiled
-def _remove(J: Array, R: Array, active: IntArray, dual: Array, drop: int, q: int, n: int) -> None:
+@inlined
+def _remove(a: Active, drop: int) -> None:
+    """Make one active row inactive again."""
+    J, R, q = a.J, a.R, a.filled[0]
+    n = a.x.size
     for j in range(drop + 1, q):
-        active[j - 1], dual[j - 1] = active[j], dual[j]
+        a.rows[j - 1], a.dual[j - 1] = a.rows[j], a.dual[j]
         for i in range(j + 1):
             R[i, j - 1] = R[i, j]
     for j in range(drop, q - 1):
@@ -249,48 +281,4 @@ def _remove(J: Array, R: Array, active: IntArray, dual: Array, drop: int, q: int
                 v, w = J[j, i], J[j + 1, i]
                 J[j, i] = c * v + s * w
                 J[j + 1, i] = c * w - s * v
-
-
-def fallback(H: Array, g: Array, A: Array, b: Array, equalities: int | np.int64) -> tuple[int, Array, Array]:
-    """DAQP, PIQP, Clarabel: the first that solves the program, or proves that nothing does."""
-    for method in (_daqp, _piqp, _clarabel):
-        try:
-            status, x, u = method(H, g, A, b, int(equalities))
-        except Exception:
-            continue  # a solver that breaks down says nothing; the next one is asked
-        if status != FAILED and np.isfinite(x).all() and np.isfinite(u).all():
-            return status, np.ascontiguousarray(x, dtype=float), np.ascontiguousarray(u, dtype=float)
-    return FAILED, np.zeros(g.size), np.zeros(b.size)
-
-
-def _daqp(H: Array, g: Array, A: Array, b: Array, equalities: int) -> tuple[int, Array, Array]:
-    upper = np.where(np.arange(b.size) < equalities, b, 1e30)
-    sense = np.where(np.arange(b.size) < equalities, 5, 0).astype(np.int32)
-    x, _, flag, info = daqp.solve(H, g, A, upper, b.copy(), sense, primal_tol=FEASIBILITY)
-    # Flag -1 means infeasible, but comes without a proof, and was seen on programs that others solve.
-    return SOLVED if flag == 1 else FAILED, np.asarray(x), -np.asarray(info["lam"])
-
-
-def _piqp(H: Array, g: Array, A: Array, b: Array, equalities: int) -> tuple[int, Array, Array]:
-    solver = piqp.DenseSolver()
-    solver.settings.eps_abs = solver.settings.eps_rel = FEASIBILITY
-    rows, e = A[equalities:], equalities
-    solver.setup(H, g, A[:e], b[:e], rows, b[e:], np.full(len(rows), np.inf))
-    if solver.solve() != piqp.PIQP_SOLVED:
-        return FAILED, g, b
-    z = solver.result
-    return SOLVED, np.array(z.x), np.concatenate([-np.array(z.y), np.array(z.z_l) - np.array(z.z_u)])
-
-
-def _clarabel(H: Array, g: Array, A: Array, b: Array, equalities: int) -> tuple[int, Array, Array]:
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = FEASIBILITY
-    cones = [clarabel.ZeroConeT(equalities), clarabel.NonnegativeConeT(b.size - equalities)]
-    sparse = scipy.sparse.csc_matrix
-    answer = clarabel.DefaultSolver(
-        sparse(np.triu(H)), g, sparse(-A), -np.asarray(b), cones, settings
-    ).solve()
-    claims = {clarabel.SolverStatus.Solved: SOLVED, clarabel.SolverStatus.PrimalInfeasible: INFEASIBLE}
-    status = claims.get(answer.status, FAILED)
-    return status, g if status == INFEASIBLE else np.array(answer.x), np.array(answer.z)
+    a.filled[0] -= 1

@@ -1,7 +1,7 @@
 """Contact-trajectory optimization (Thesis 3.1): the task and its answer."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -153,6 +153,7 @@ class Plan:
     status: optimal (gap certified), feasible (budget spent, plan found), infeasible (proved, see `reason`), time_limit (nothing found).
     objective, bound: SI cost and its certified lower bound.  modes (T, C): facet or FREE.
     positions (T, C, 2) [m] and forces (T, C, 2) [N, on the object], world frame.  Empty arrays where there is no plan.
+    certificate: what proves the bound, or that there is no plan (docs/contact-solver.md); None where nothing does.
     """
 
     status: Status
@@ -166,6 +167,7 @@ class Plan:
     contact_forces: tuple[ContactForce, ...] = ()
     residual: float = np.nan
     reason: str = ""
+    certificate: dict[str, Any] | None = field(default=None, repr=False, compare=False)
 
     @property
     def gap(self) -> float:

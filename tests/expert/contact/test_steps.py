@@ -1,12 +1,14 @@
 """Wrench cones of one step: closed forms and certified bounds against sampling and scanning."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from expert.contact.scaled import ScaledTask
-from expert.contact.steps import cost_bound, gain, reach, shortfall, solve_step, tighten
+from expert.contact.steps import Stance, cost_bound, gain, reach, shortfall, solve_step, step_program
 from expert.geometry.pose import cross
 from expert.numeric.qp import INFEASIBLE, SOLVED
 from expert.problems.contact import Robustness
@@ -63,40 +65,32 @@ def test_no_contact_positions_in_the_box_cost_less_than_its_bound(
     rng = np.random.default_rng(seed)
     facets = np.array(on)
     lo, hi = np.sort(rng.uniform(0, 1, (2, len(on))), axis=0)
-    status, _, bound, y, _ = solve_step(scaled, t, facets, lo, hi)
+    stance = Stance(t, facets, lo, hi)
+    least = solve_step(scaled, stance)
     for _ in range(10):
         rho = rng.uniform(lo, hi)
-        inside, cost, below, _, _ = solve_step(scaled, t, facets, rho, rho)
-        if status == INFEASIBLE:
-            assert shortfall(scaled, t, facets, lo, hi, y) > 0
-            assert inside == INFEASIBLE
-        elif inside == SOLVED:
-            assert cost >= bound - 1e-9 * (1 + abs(cost))
-            assert cost == pytest.approx(below, rel=1e-5, abs=1e-6)
-            assert cost >= cost_bound(scaled, t, facets, rho, rho, rng.normal(size=3)) - 1e-9
+        there = Stance(t, facets, rho, rho)
+        inside = solve_step(scaled, there)
+        if least.status == INFEASIBLE:
+            assert shortfall(scaled, stance, least.y) > 0
+            assert inside.status == INFEASIBLE
+        elif inside.status == SOLVED:
+            assert inside.cost >= least.bound - 1e-9 * (1 + abs(inside.cost))
+            assert inside.cost == pytest.approx(inside.bound, rel=1e-5, abs=1e-6)
+            assert inside.cost >= cost_bound(scaled, there, rng.normal(size=3)) - 1e-9
 
 
-def test_tightened_ranges_agree_with_a_scan() -> None:
-    moved = 0
-    for seed in range(12):
-        scaled = ScaledTask.of(floor_task(np.random.default_rng(seed)))
-        for on in ([0, 2], [1, 3], [1, 2]):
-            facets, t = np.array(on), seed % 4
-            lo, hi = np.full(2, 0.05), np.full(2, 0.95)
-            kept = tighten(scaled, t, facets, lo, hi, 0, 0) and tighten(scaled, t, facets, lo, hi, 0, 1)
-            grid = np.linspace(0.05, 0.95, 181)
-            feasible = []
-            for rho in grid:
-                low, high = np.array([rho, 0.05]), np.array([rho, 0.95])
-                if solve_step(scaled, t, facets, low, high)[0] != INFEASIBLE:
-                    feasible.append(rho)
-            if not feasible:
-                assert not kept or solve_step(scaled, t, facets, lo, hi)[0] != INFEASIBLE
-                continue
-            moved += lo[0] > 0.05 or hi[0] < 0.95
-            assert kept
-            assert lo[0] <= feasible[0] + 1e-9
-            assert hi[0] >= feasible[-1] - 1e-9
-            assert lo[0] >= feasible[0] - 0.005 - 1e-3
-            assert hi[0] <= feasible[-1] + 0.005 + 1e-3
-    assert moved >= 3
+@pytest.mark.parametrize("case", range(4))
+def test_the_forces_found_balance_the_step_within_their_cones(case: int) -> None:
+    scaled, seen = TASKS[case], 0
+    for t in range(scaled.steps):
+        for on in itertools.combinations(range(scaled.facets), 2):
+            rho = np.full(2, 0.4)
+            stance = Stance(t, np.array(on), rho, rho)
+            found = solve_step(scaled, stance)
+            if found.status == SOLVED:
+                seen += 1
+                program = step_program(scaled, stance)
+                np.testing.assert_allclose(program.A[:3] @ found.x, scaled.required[t], atol=1e-8)
+                assert (program.A[3:] @ found.x >= program.b[3:] - 1e-8).all()
+    assert seen > 0

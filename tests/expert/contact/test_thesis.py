@@ -26,7 +26,7 @@ def reference(name: str) -> ContactTask:
 @pytest.mark.parametrize("name", ["sq_slide1", "sd_slide1", "pl_curve1"])
 def test_one_finger_primitives_are_bounded_from_below(name: str) -> None:
     task = reference(name)
-    plan, exact = thesis.solve(task, gap=GAP), solve_exactly(task, gap=GAP)
+    plan, exact = thesis.solve(task, gap=GAP, time_limit=60.0), solve_exactly(task, gap=GAP)
     assert plan.status == exact.status == "optimal"
     assert plan.bound <= exact.objective * (1 + 1e-9)
     assert plan.objective <= exact.objective * (1 + 2 * GAP)
@@ -35,7 +35,7 @@ def test_one_finger_primitives_are_bounded_from_below(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["sq_lift1", "pl_rot1", "tri_pivot1", "tri_lift2"])
 def test_what_the_relaxation_refutes_is_infeasible(name: str) -> None:
-    plan = thesis.solve(reference(name))
+    plan = thesis.solve(reference(name), gap=GAP, time_limit=60.0)
     assert plan.status == "infeasible"
     assert not plan.found
     assert plan.bound == np.inf
@@ -56,7 +56,7 @@ def envelope_error(plan: Plan, task: ContactTask) -> float:
 
 def test_a_plan_states_its_envelope_error_and_breaks_no_other_law() -> None:
     task = reference("sd_slide1")
-    plan = thesis.solve(task, gap=GAP)
+    plan = thesis.solve(task, gap=GAP, time_limit=60.0)
     assert plan.residual == pytest.approx(envelope_error(plan, task), rel=1e-6)
     assert plan.residual > 1e-3  # the checker refutes it, and the plan says so itself
     assert [check.name for check in check_plan(task, plan).violations] == ["newton_euler"]
@@ -66,7 +66,7 @@ def test_a_plan_states_its_envelope_error_and_breaks_no_other_law() -> None:
 def test_more_segments_tighten_the_relaxation() -> None:
     task = reference("pl_curve1")
     exact = solve_exactly(task, gap=1e-4)
-    plans = [thesis.solve(task, gap=1e-4, segments=m) for m in (1, 4, 16)]
+    plans = [thesis.solve(task, gap=1e-4, segments=m, time_limit=60.0) for m in (1, 4, 16)]
     bounds = [plan.bound for plan in plans]
     assert bounds[0] < bounds[1] < bounds[2] <= exact.objective * (1 + 1e-6)
     assert plans[2].residual < plans[0].residual
@@ -78,7 +78,7 @@ def test_coarse_envelopes_make_the_impossible_look_feasible() -> None:
     """Thesis Fig. 3-6e: one finger cannot pivot the tool at friction 0.1; envelopes of one segment say that it can."""
     task = reference("sd_pivot1")
     assert solve_exactly(task).status == "infeasible"
-    coarse = thesis.solve(task, segments=1)
+    coarse = thesis.solve(task, gap=GAP, time_limit=60.0, segments=1)
     assert coarse.found
     assert coarse.residual > 0.1
     assert check_plan(task, coarse).verdict == "refuted"
@@ -93,7 +93,7 @@ def test_small_random_tasks_are_bounded_from_below(seed: int) -> None:
         if seed % 2
         else floor_task(rng, steps=3, fingers=1, margin=0.1 * (seed == 2), robustness=options)
     )
-    plan, exact = thesis.solve(task, gap=GAP), solve_exactly(task, gap=GAP)
+    plan, exact = thesis.solve(task, gap=GAP, time_limit=60.0), solve_exactly(task, gap=GAP)
     if plan.status == "infeasible":
         assert exact.status == "infeasible"
         return
@@ -105,7 +105,7 @@ def test_small_random_tasks_are_bounded_from_below(seed: int) -> None:
 
 
 def test_out_of_time_is_not_infeasible() -> None:
-    plan = thesis.solve(reference("sq_pivot2"), time_limit=0.01)
+    plan = thesis.solve(reference("sq_pivot2"), gap=GAP, time_limit=0.01)
     assert plan.status == "time_limit"
     assert not plan.found
     assert plan.bound < 1.0
@@ -116,13 +116,13 @@ def test_a_numerical_failure_is_raised_not_reported_as_infeasible(monkeypatch: p
         thesis, "solve_program", lambda *args, **options: Result(status="failed", message="LP trouble")
     )
     with pytest.raises(SolverFailed, match="LP trouble"):
-        thesis.solve(reference("sq_slide1"))
+        thesis.solve(reference("sq_slide1"), gap=GAP, time_limit=60.0)
 
 
 def test_the_cost_weights_are_those_asked_for() -> None:
     task = reference("sq_slide1")
     forces_alone = replace(task, cost=replace(task.cost, acceleration=0.0))
     twice = replace(task, cost=replace(task.cost, acceleration=0.0, force=2.0))
-    once, double = (thesis.solve(t, gap=1e-6) for t in (forces_alone, twice))
+    once, double = (thesis.solve(t, gap=1e-6, time_limit=60.0) for t in (forces_alone, twice))
     assert double.objective == pytest.approx(2 * once.objective, rel=1e-4)
     assert once.objective == pytest.approx((once.forces**2).sum())

@@ -86,7 +86,7 @@ def test_exact_plans_satisfy_every_block(case: int) -> None:
     assign_cells(x, s, SEGMENTS, copies)
     for block in program:
         assert max(float(np.max(c.violation())) for c in block.constraints) < 1e-7, block.label
-    assert float(cost(x, s).value) * s.weight**2 == pytest.approx(plan.objective, rel=1e-6)
+    assert float(cost(x, s).value) * s.cost_unit == pytest.approx(plan.objective, rel=1e-6)
 
 
 def test_ct1_leaves_no_force_unbalanced(x: Variables, s: ScaledTask, largest: Callable[..., float]) -> None:
