@@ -1,6 +1,7 @@
 """What `time_limit` means: processor time of the work, counted the same way by every stage of every kind."""
 
 import time
+from math import inf
 
 
 class Budget:
@@ -34,3 +35,7 @@ class Budget:
     def part(self, seconds: float) -> "Budget":
         """A budget of its own for a stage, from now on: so many seconds, but never more than what is left here."""
         return Budget(min(seconds, self.left))
+
+
+UNLIMITED = Budget(inf)
+"""For work without a limit."""

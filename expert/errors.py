@@ -21,5 +21,9 @@ def _rebuild(cls: type, field: str, expected: str, got: str, remedy: str) -> Inv
     return cls(field, expected=expected, got=got, remedy=remedy)
 
 
+class OutOfTime(ExpertError):
+    """A budget was spent before there was an answer.  Says nothing about what the answer would be."""
+
+
 class SolverFailed(ExpertError):
     """A numerical method gave no answer.  Says nothing about feasibility."""

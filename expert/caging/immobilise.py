@@ -15,21 +15,23 @@ import numpy as np
 
 from expert.geometry.polygon import facet_frames, facets, reflex_vertices, signed_distance
 from expert.geometry.pose import Array
-from expert.loops.normals import spans
+from expert.loops.normals import widest_gap
 
 CLEARANCES = (0.04, 0.02, 0.01, 0.005, 0.0025)
 """Tried in this order, relative to the object's size."""
 SPANNING = 1e-3
 """Neighbouring directions of three contacts are less than half a turn apart by this angle [rad]."""
-STARTS = 8
-"""Newton's method starts so often for each triple of features."""
+STARTS, MOST_TRIPLES = 8, 2000
+"""Newton's method starts so often for each triple of features; where there are more of these, for so many at random."""
+BATCH = 6
+"""So many grasps are tried at all clearances before the next ones are looked at."""
 
 
 def candidates(vertices: Array, count: int, size: float, rng: np.random.Generator) -> Iterator[Array]:
     """Fingers (count, 2) in the body frame, the loosest first; fingers beyond those that hold it stand near other facets."""
-    grasps = [*(_discs(vertices, rng) if count > 2 else ()), *_pairs(vertices)]
-    for clearance in CLEARANCES:
-        for contacts, outward in grasps:
+    grasps = itertools.chain(_discs(vertices, rng) if count > 2 else (), _pairs(vertices))
+    while batch := list(itertools.islice(grasps, BATCH)):
+        for clearance, (contacts, outward) in itertools.product(CLEARANCES, batch):
             fingers = contacts + clearance * size * outward
             spare = _spare(vertices, fingers, count - len(fingers), clearance * size)
             placed = np.concatenate([fingers, spare])
@@ -50,18 +52,17 @@ def _spare(vertices: Array, fingers: Array, count: int, clearance: float) -> Arr
     return chosen
 
 
-def _discs(vertices: Array, rng: np.random.Generator) -> list[tuple[Array, Array]]:
+def _discs(vertices: Array, rng: np.random.Generator) -> Iterator[tuple[Array, Array]]:
     """Contacts (3, 2) and outward directions of discs in the object that three features hold, the largest first."""
     discs = _tangent_discs(vertices, rng)
     size = float(np.ptp(vertices, axis=0).max())
     exact = np.abs(-signed_distance(vertices, discs[:, :2]) - discs[:, 2]) < 1e-7 * size
-    kept: list[Array] = []
-    grasps = []
-    for disc in sorted(discs[exact], key=lambda d: -d[2]):
-        if all(np.linalg.norm(disc - other) > 1e-3 * size for other in kept):
-            kept.append(disc)
-            grasps += list(_held(vertices, disc[:2], disc[2]))
-    return grasps
+    left = discs[exact]
+    left = left[np.argsort(-left[:, 2], kind="stable")]
+    while len(left):
+        disc = left[0]
+        yield from _held(vertices, disc[:2], disc[2])
+        left = left[np.linalg.norm(left - disc, axis=1) > 1e-3 * size]
 
 
 def _tangent_discs(vertices: Array, rng: np.random.Generator) -> Array:
@@ -69,6 +70,8 @@ def _tangent_discs(vertices: Array, rng: np.random.Generator) -> Array:
     inward, _ = facet_frames(vertices)
     corners = vertices[reflex_vertices(vertices)]
     triples = np.array(list(itertools.combinations(range(len(vertices) + len(corners)), 3)))
+    if len(triples) > MOST_TRIPLES:
+        triples = triples[rng.choice(len(triples), MOST_TRIPLES, replace=False)]
     triples = np.concatenate([triples] * STARTS)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     x = np.column_stack([rng.uniform(low, high, (len(triples), 2)), np.zeros(len(triples))])
@@ -88,18 +91,19 @@ def _tangent_discs(vertices: Array, rng: np.random.Generator) -> Array:
 
 
 def _held(vertices: Array, centre: Array, radius: float) -> Iterator[tuple[Array, Array]]:
-    """Triples of contacts of the disc whose directions positively span the plane."""
+    """Triples of contacts of the disc whose directions positively span the plane, the most evenly spread first."""
     nearest = _nearest_on_facets(vertices, centre)
     touching = nearest[np.linalg.norm(nearest - centre, axis=1) <= radius * (1 + 1e-6)]
     points: list[Array] = []
     for p in touching:
         if all(np.linalg.norm(p - q) > 1e-3 * radius for q in points):
             points.append(p)
-    for triple in itertools.combinations(points, 3):
-        contacts = np.array(triple)
-        outward = (contacts - centre) / np.linalg.norm(contacts - centre, axis=1, keepdims=True)
-        if spans(outward, SPANNING):
-            yield contacts, outward
+    triples = np.array(list(itertools.combinations(points, 3))).reshape(-1, 3, 2)
+    outward = (triples - centre) / np.linalg.norm(triples - centre, axis=2, keepdims=True)
+    widest = np.array([widest_gap(directions) for directions in outward])
+    for k in np.argsort(widest, kind="stable"):
+        if widest[k] < np.pi - SPANNING:
+            yield triples[k], outward[k]
 
 
 def _nearest_on_facets(vertices: Array, x: Array) -> Array:

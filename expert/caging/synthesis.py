@@ -53,6 +53,8 @@ KNOWN: dict[CageStatus, str] = {
     "time_limit": "undecided in their share of the time",
 }
 """What a search for some number of fingers says.  None of it is a proof that they cannot cage the object."""
+MOST_PIECES = 24
+"""Of the cover, in any model."""
 MOST_CUTS = 5
 """Refuted answers per model after which the next one is tried."""
 
@@ -181,7 +183,7 @@ def _attempts(problem: CageProblem, method: CageMethod) -> Iterator[Attempt | No
     sizes = (False,) if few or problem.grippers else (True, False)
     slices = (1.0, 4.0, 16.0, 64.0) if plain else (3.0, 10.0, 30.0)
     for seconds, (below, above), one_piece in itertools.product(slices, ranges, sizes):
-        yield Attempt(below, above, 99, one_piece, seconds)
+        yield Attempt(below, above, MOST_PIECES, one_piece, seconds)
 
 
 def _try_grasps(tally: Tally) -> None:
@@ -216,7 +218,9 @@ def _try(tally: Tally, fingers: Array, cell_budget: int) -> None:
     slack = 0.5 * problem.margin * problem.shape.size
     tally.attempts += 1
     try:
-        report = verify_cage(problem.arrangement(fingers), slack=slack, cell_budget=cell_budget)
+        report = verify_cage(
+            problem.arrangement(fingers), slack=slack, cell_budget=cell_budget, time_limit=tally.budget.left
+        )
     except InvalidProblem:  # inside the object
         return
     if report.verdict == "caged":
@@ -258,7 +262,7 @@ def _try_models(tally: Tally, attempt: Attempt, solver: CageSolver) -> None:
             model = SweptModel(
                 geometry, ring, (-attempt.below, attempt.above), hubs=filling, one_piece=attempt.one_piece
             )
-            if not model.feasible:
+            if not model.feasible or tally.budget.over:
                 continue
             break_symmetry(model, problem)
             require(model, problem, frame, solver, opening, tally.best.objective)

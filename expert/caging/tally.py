@@ -33,7 +33,7 @@ class Tally:
     def judge(self, fingers: Array) -> CageReport | None:
         """Verify a model's fingers (count, 2) [m] and count.  None where they do not even fit beside the object."""
         try:
-            report = verify_cage(self.problem.arrangement(fingers))
+            report = verify_cage(self.problem.arrangement(fingers), time_limit=self.budget.left)
         except InvalidProblem:
             self.refuted += 1
             return None

@@ -35,7 +35,7 @@ class GoalCell:
     """Facets of the fingers, sorted by normal angle, and which rays end the cell above (up) and below (down) the goal.
 
     Three fingers have one ray, and hold the object by its curvature where their normals meet in a point.
-    jaws: what grippers ask of the fingers at every knot.
+    jaws: what grippers ask of the fingers at every knot.  least: moment that the rays must have at the end.
     """
 
     table: Facets
@@ -44,6 +44,7 @@ class GoalCell:
     down: int
     margin: float
     jaws: Rows | None = None
+    least: float = LEAST_MOMENT
 
     @property
     def count(self) -> int:
@@ -149,15 +150,15 @@ class GoalCell:
             parts += [below.at(side * limit), below.at(side * reach), falling.slope(side * limit)]
         return Rows.join([*parts, self.jaws] if self.jaws is not None else parts)
 
-    def held(self, moment: float = LEAST_MOMENT) -> list[Rows]:
+    def held(self, moment: float | None = None) -> list[Rows]:
         """All fingers touch at the goal, as the grippers allow, and the rays' moments hold it (form closure)."""
         touch, level = self.clearance().at(0.0), self.moments()
-        least = np.zeros(1) if self.concurrent else np.full(2, moment)
+        least = np.zeros(1) if self.concurrent else np.full(2, self.least if moment is None else moment)
         most = np.zeros(1) if self.concurrent else np.full(2, np.inf)
         hold = Rows(level.V[: len(least)], least, most)
         return [Rows(touch.V, touch.low, touch.low), hold, *([self.jaws] if self.jaws is not None else [])]
 
-    def end(self, reach: float, moment: float = LEAST_MOMENT) -> Rows:
+    def end(self, reach: float, moment: float | None = None) -> Rows:
         """Conditions at the last knot: the grasp holds, and the object is shut out on arrival at +-reach."""
         parts = [self.contacts.over(-reach, reach), *self.held(moment)]
         if not self.concurrent:

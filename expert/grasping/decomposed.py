@@ -13,6 +13,7 @@ import clarabel
 import numpy as np
 import scipy.sparse as sp
 
+from expert.budget import Budget
 from expert.geometry.pose import Array
 from expert.grasping.cell import GoalCell
 from expert.grasping.goal_cell import MIN_WEIGHT, SUM_WEIGHT
@@ -34,15 +35,15 @@ class Topology:
 
 
 def topologies(
-    geometry: FacetGeometry, grasp: GoalCell, knots: Sequence[Knot], seconds: float
+    geometry: FacetGeometry, grasp: GoalCell, knots: Sequence[Knot], budget: Budget
 ) -> Iterator[Topology]:
     """For each filling the topology of the largest start, where the end knots of the grasp exist at all."""
     for hubs in fillings(grasp):
         model = NestedCages(geometry, [grasp], [knots[0], knots[-1]], hubs=hubs)
-        if not model.feasible:
+        if not model.feasible or budget.over:
             return
         model.maximise_attraction()
-        x = model.milp.solve("highs", time_limit=seconds).x
+        x = model.milp.solve("highs", time_limit=budget.left).x
         if x is not None:
             yield topology_of(model, x)
 

@@ -13,6 +13,9 @@ from expert.geometry.polygon import facet_frames, facets
 from expert.geometry.pose import Array
 from expert.loops.normals import same_direction, spans
 
+MOST_FACETS = 20
+"""Of an object with more facets some are no place for a finger: what is left has about 9,000 choices of four."""
+
 
 @dataclass(frozen=True)
 class Facets:
@@ -81,8 +84,12 @@ class Facets:
 
 
 def tuples(table: Facets, count: int) -> Iterator[tuple[int, ...]]:
-    """Facets that `count` fingers can hold the object by, two fingers on a facet at most, sorted by normal angle."""
-    for chosen in itertools.combinations_with_replacement(range(len(table)), count):
+    """Facets that `count` fingers can hold the object by, two fingers on a facet at most, sorted by normal angle.
+
+    Of the longest MOST_FACETS only: the longer a facet, the farther the object may turn with a finger on it.
+    """
+    longest = np.argsort(table.low - table.high, kind="stable")[:MOST_FACETS]
+    for chosen in itertools.combinations_with_replacement(np.sort(longest).tolist(), count):
         most = max(chosen.count(k) for k in chosen)
         if most <= 2 and spans(table.normals[list(chosen)]):
             yield table.by_angle(chosen)

@@ -39,8 +39,8 @@ class Candidate:
     firmest: float
 
 
-def cells(table: Facets, count: int, margin: float) -> list[GoalCell]:
-    """Facets and rays that may hold the object at the goal: moments of both senses are within reach of the contacts.
+def cells(table: Facets, count: int, margin: float, least: float = LEAST_MOMENT) -> list[GoalCell]:
+    """Facets and rays that may hold the object at the goal: moments of both senses of at least `least` are within reach.
 
     Where two fingers share a facet, changing places exchanges the rays: one order of these is enough.
     """
@@ -48,13 +48,13 @@ def cells(table: Facets, count: int, margin: float) -> list[GoalCell]:
     for chosen in tuples(table, count):
         reachable = _moments(table, chosen, margin)
         if count == 3:
-            cell = GoalCell(table, chosen, 0, 0, margin)
+            cell = GoalCell(table, chosen, 0, 0, margin, least=least)
             if cell.E[0] > 0 and reachable[0, 0] < 0 < reachable[0, 1]:
                 found.append(cell)
             continue
         for up, down in ((0, 1), (1, 0)) if len(set(chosen)) == count else ((0, 1),):
-            if reachable[up, 0] < -LEAST_MOMENT and reachable[down, 1] > LEAST_MOMENT:
-                found.append(GoalCell(table, chosen, up, down, margin))
+            if reachable[up, 0] < -least and reachable[down, 1] > least:
+                found.append(GoalCell(table, chosen, up, down, margin, least=least))
     return found
 
 
@@ -177,11 +177,13 @@ def some_knot(cell: GoalCell, rows: Rows) -> Array | None:
 
 def candidate(cell: GoalCell, half_ranges: Array) -> Candidate | None:
     """The best start and some end of a goal cell whose every knot exists."""
+    best = start_knot(
+        cell, cell.knot(half_ranges[0], half_ranges[0])
+    )  # mostly what fails, where anything does
+    if best is None:
+        return None
     firmest = firmest_end(cell, half_ranges[-2])
     if firmest is None:
-        return None
-    best = start_knot(cell, cell.knot(half_ranges[0], half_ranges[0]))
-    if best is None:
         return None
     for reach, limit in itertools.pairwise(half_ranges[:-1]):
         if some_knot(cell, cell.knot(reach, limit)) is None:

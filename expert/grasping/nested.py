@@ -15,7 +15,7 @@ import numpy as np
 
 from expert.geometry.convex import Region
 from expert.geometry.pose import Array
-from expert.grasping.cell import LEAST_MOMENT, NARROW, GoalCell
+from expert.grasping.cell import NARROW, GoalCell
 from expert.grasping.facets import Facets
 from expert.grasping.goal_cell import DIRECTIONS, MIN_WEIGHT, SUM_WEIGHT
 from expert.grasping.smooth import SPEED
@@ -121,7 +121,7 @@ class NestedCages(LoopModel):
         for z, grasp in zip([self.z[g] for g in range(len(self.grasps))], self.grasps, strict=True):
             tangents = self.table.tangents[list(grasp.chosen)]
             arms = (self.p[-1] * tangents).sum(axis=1)
-            least = 0.0 if grasp.concurrent else LEAST_MOMENT
+            least = 0.0 if grasp.concurrent else grasp.least
             for ray, sign in ((grasp.up, 1.0), (grasp.down, -1.0)):
                 moment = sign * (grasp.rays[ray] @ arms)
                 most = float(np.abs(grasp.rays[ray][:, None] * tangents).sum() * FARTHEST)

@@ -36,22 +36,32 @@ ENLARGED = 10
 """So many goal cells, the best by 5-CT16, have the area of their start maximised."""
 FIRMNESS = 0.5
 """Share of the largest moment that could hold the object in the end which smoothing must leave."""
+LOOKING, MOST_CANDIDATES = 0.3, 1500
+"""Share of what is left of the time in which goal cells are looked for, and how many are enough."""
+NARROWER, MOST_NARROW = (0.75, 0.5, 0.3, 0.15, 0.07), 4
+"""Shares of the half-ranges that are tried where the whole is not found, and goal cells of each that are offered."""
+SLIGHT_MOMENT = 0.01
+"""Moment (relative length) that holds an object in the end which allows no more, being thin."""
+TRYING, MOST_PIECES, MOST_GRASPS = 0.4, 6, 500
+"""The decomposed search takes this share of what is left of the time; pieces and grasps that nested cages choose among."""
 BATCH, MIP_SECONDS = 24, 5.0
 """The decomposed search ranks so many grasps at once, and gives each choice of a topology this long [s]."""
-PROGRAM_SHARE = 0.2
-"""Share of the time limit that each program of MIQP1 and MIQP2 may take."""
 SHARES = (0.98, 0.75)
 """Shares of its region of attraction that a path of the decomposed search is tried with."""
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """Relative path (K, N, 2), object facet of each finger, relative region of attraction (M, 2) at the goal's angle."""
+    """Relative path (K, N, 2), object facet of each finger, relative region of attraction (M, 2) at the goal's angle.
+
+    share: of the half-ranges asked for, within which it keeps the object.
+    """
 
     path: Array
     facets: tuple[int, ...]
     starts: Array
     method: str
+    share: float = 1.0
 
     def labelled(self, places: Places) -> "Proposal":
         """The same with the fingers in the order of the problem."""
@@ -91,11 +101,17 @@ class RelativeProblem:
         """Whether smooth paths are wanted rather than a large start."""
         return self.problem.cost == "acceleration"
 
+    @cached_property
+    def _ranked(self) -> list[GoalCell]:
+        known = self.table, self.problem.count, self.margin
+        return sorted(cells(*known) or cells(*known, SLIGHT_MOMENT), key=lambda c: -hold(c))
+
     def cells(self) -> Iterator[tuple[GoalCell, Places]]:
         """Facets and rays, the firmest first, with every way to put labelled fingers there."""
         ways = placements(self.problem)
-        ranked = sorted(cells(self.table, self.problem.count, self.margin), key=lambda c: -hold(c))
-        for cell, places in itertools.product(ranked, ways):
+        for cell, places in itertools.product(self._ranked, ways):
+            if self.budget.over:
+                return
             held = None
             if self.problem.grippers:
                 middles = 0.5 * (self.table.low + self.table.high)[:, None] * self.table.tangents
@@ -106,40 +122,48 @@ class RelativeProblem:
                 yield labelled, places
 
 
-def goal_cells(task: RelativeProblem) -> Iterator[Proposal]:
-    """Goal cells in the order of the area of their start, or of their smoothness."""
+def goal_cells(task: RelativeProblem, share: float = 1.0) -> Iterator[Proposal]:
+    """Goal cells in the order of the area of their start, or of their smoothness.
+
+    share: of the half-ranges asked for, within which they keep the object.
+    """
+    ranges = share * task.problem.half_ranges
     found: list[tuple[Candidate, Places]] = []
+    looking = task.budget.part(LOOKING * task.budget.left)
     for cell, places in task.cells():
-        if task.budget.over:
+        if looking.over or len(found) == MOST_CANDIDATES:
             break
-        known = candidate(cell, task.problem.half_ranges)
+        known = candidate(cell, ranges)
         if known is not None:
             found.append((known, places))
     found.sort(key=lambda entry: -entry[0].attraction)
     if task.by_acceleration:
-        smooth = [p for entry in found if (p := _path_of_cell(task, *entry))]
+        smooth = [p for entry in found if not task.budget.over and (p := _path_of_cell(task, *entry, share))]
         yield from sorted(smooth, key=lambda p: acceleration(p.path))
         return
-    for entries in (_enlarged(task, found[:ENLARGED]), found[ENLARGED:]):
+    for entries in (_enlarged(task, found[:ENLARGED], ranges[0]), found[ENLARGED:]):
         for entry in entries:
-            proposal = _path_of_cell(task, *entry)
+            proposal = _path_of_cell(task, *entry, share)
             if proposal is not None:
                 yield proposal
 
 
-def _enlarged(task: RelativeProblem, found: list[tuple[Candidate, Places]]) -> list[tuple[Candidate, Places]]:
-    """The same cells with the start of largest area, the largest first."""
-    first = task.problem.half_ranges[0]
+def _enlarged(
+    task: RelativeProblem, found: list[tuple[Candidate, Places]], first: float
+) -> list[tuple[Candidate, Places]]:
+    """The same cells with the start of largest area for the first half-range [rad], the largest first."""
     sized = []
     for known, places in found:
+        if task.budget.over:
+            break
         area, start = largest_start(known.cell, known.cell.knot(first, first), known.start)
         sized.append((area, replace(known, start=start), places))
     sized.sort(key=lambda entry: -entry[0])
     return [(known, places) for _, known, places in sized]
 
 
-def _path_of_cell(task: RelativeProblem, known: Candidate, places: Places) -> Proposal | None:
-    ranges, cell = task.problem.half_ranges, known.cell
+def _path_of_cell(task: RelativeProblem, known: Candidate, places: Places, share: float) -> Proposal | None:
+    ranges, cell = share * task.problem.half_ranges, known.cell
     reaches = np.concatenate([ranges[:1], ranges[:-2]])
     knots = [cell.knot(reach, limit) for reach, limit in zip(reaches, ranges[:-1], strict=True)]
     end = cell.end(ranges[-2], FIRMNESS * known.firmest)
@@ -149,29 +173,46 @@ def _path_of_cell(task: RelativeProblem, known: Candidate, places: Places) -> Pr
         return None
     if path is None:
         return None
-    return Proposal(path, cell.chosen, region(cell, path[0]), "goal_cell").labelled(places)
+    return Proposal(path, cell.chosen, region(cell, path[0]), "goal_cell", share).labelled(places)
 
 
-def decomposed(task: RelativeProblem) -> Iterator[Proposal]:
-    """Nested cages over ranked final grasps, a few at a time, each answer also with smaller starts."""
+def narrower(task: RelativeProblem) -> Iterator[Proposal]:
+    """Goal cells, then nested cages, that keep the object within smaller ranges than it may use, the widest first.
+
+    Where facets are short no others may exist: a regular polygon of many facets and a thin rectangle allow nothing else.
+    """
+    for share in NARROWER:
+        if not task.budget.over:
+            yield from itertools.islice(goal_cells(task, share), MOST_NARROW)
+    for share in NARROWER:
+        if not task.budget.over:
+            yield from itertools.islice(decomposed(task, share), MOST_NARROW)
+
+
+def decomposed(task: RelativeProblem, share: float = 1.0) -> Iterator[Proposal]:
+    """Nested cages over ranked final grasps, a few at a time, each answer also with smaller starts.
+
+    share: of the half-ranges asked for, within which they keep the object.
+    """
+    budget = task.budget.part(TRYING * task.budget.left)
     ranked = list(task.cells())
-    geometry = FacetGeometry(task.table.vertices, task.margin)
-    knots = schedule(task.problem.half_ranges, task.margin)
+    geometry = FacetGeometry(task.table.vertices, task.margin, MOST_PIECES)
+    knots = schedule(share * task.problem.half_ranges, task.margin)
     for first in range(0, len(ranked), BATCH):
         found = []
         for cell, places in ranked[first : first + BATCH]:
-            for topology in topologies(geometry, cell, knots, MIP_SECONDS):
-                found.append((topology, places))
-            if task.budget.over:
+            if budget.over:
                 break
+            for topology in topologies(geometry, cell, knots, budget.part(MIP_SECONDS)):
+                found.append((topology, places))
         found.sort(key=lambda entry: -entry[0].value)
-        for (topology, places), share in itertools.product(found, SHARES):
-            if task.budget.over:
+        for (topology, places), kept in itertools.product(found, SHARES):
+            if budget.over:
                 return
-            path = smooth_path(geometry, topology, knots, share)
+            path = smooth_path(geometry, topology, knots, kept)
             if path is not None:
                 starts = _free_region(task, topology.grasp.chosen, path[0])
-                yield Proposal(path, topology.grasp.chosen, starts, "decomposed").labelled(places)
+                yield Proposal(path, topology.grasp.chosen, starts, "decomposed", share).labelled(places)
 
 
 def thesis(task: RelativeProblem, name: Name) -> Iterator[Proposal]:
@@ -180,12 +221,12 @@ def thesis(task: RelativeProblem, name: Name) -> Iterator[Proposal]:
         what = "a problem without grippers"
         remedy = "method: goal_cell or decomposed"
         raise InvalidProblem("method", expected=what, got=f"{name} with grippers", remedy=remedy)
-    grasps = [cell for cell, _ in task.cells()]
+    grasps = [cell for cell, _ in itertools.islice(task.cells(), MOST_GRASPS)]
     if not grasps:
         return
-    geometry = FacetGeometry(task.table.vertices, task.margin)
+    geometry = FacetGeometry(task.table.vertices, task.margin, MOST_PIECES)
     knots = schedule(task.problem.half_ranges, task.margin)
-    for topology, path in solutions(geometry, grasps, knots, name, PROGRAM_SHARE * task.budget.left):
+    for topology, path in solutions(geometry, grasps, knots, name, task.budget):
         facets = topology.grasp.chosen
         yield Proposal(path, facets, _free_region(task, facets, path[0]), name)
         if task.budget.over:

@@ -10,7 +10,14 @@ from itertools import islice
 from expert.budget import Budget
 from expert.errors import InvalidProblem
 from expert.geometry.pose import rotation
-from expert.grasping.proposals import Proposal, RelativeProblem, decomposed, goal_cells, thesis
+from expert.grasping.proposals import (
+    Proposal,
+    RelativeProblem,
+    decomposed,
+    goal_cells,
+    narrower,
+    thesis,
+)
 from expert.grasping.smooth import acceleration
 from expert.problems.grasp import GraspMethod, GraspOptions, GraspProblem, GraspSolution
 from expert.verify.grasp.check import verify_grasp
@@ -30,49 +37,53 @@ def solve(
 ) -> GraspSolution:
     """A certified grasp, the best by the problem's cost among those that the method proposes (Thesis 5.2.5).
 
-    goal_cell: goal cells, and the decomposed search where none of them is confirmed; the answer names what found it.
+    goal_cell: goal cells; where none of them is confirmed, goal cells that keep the object within narrower ranges than it
+    may use, and then the decomposed search, whose answers are preferred.  The answer names what found it.
     time_limit [s]: processor time.  Raises InvalidProblem for an unknown method.
     """
     if method not in METHODS:
         raise InvalidProblem("method", expected=" or ".join(METHODS), got=repr(method))
     task = RelativeProblem(problem, Budget(time_limit))
     doubted: list[GraspSolution] = []
+    best: tuple[float, GraspSolution] = 0.0, GraspSolution(status="none_found")
     for proposals in METHODS[method](task):
         found = _first_certified(task, proposals, doubted)
-        if found is not None or task.budget.over:
+        best = max(best, found, key=lambda entry: entry[0])
+        if best[0] == 1 or task.budget.over:
             break
-    answer = found or _without_certificate(task, doubted)
+    answer = best[1] if best[0] > 0 else _without_certificate(task, doubted)
     return replace(answer, method=answer.method or method, refuted=len(doubted), seconds=task.budget.spent)
 
 
 def _first_certified(
     task: RelativeProblem, proposals: Iterator[Proposal], doubted: list[GraspSolution]
-) -> GraspSolution | None:
-    """The first proposal that the checker confirms; the others are added to `doubted`.
+) -> tuple[float, GraspSolution]:
+    """The first proposal that the checker confirms, and its share of the half-ranges; the others are added to `doubted`.
 
     What it cannot decide quickly is put aside: mostly another proposal, hardly worse, is easier to confirm.
     """
-    unsure: list[GraspSolution] = []
+    unsure: list[tuple[float, GraspSolution]] = []
     for proposal in proposals:
         answer = _answer(task, proposal)
         report = _check(task, answer, QUICK_CHECK)
         if report.verdict == "certified":
-            return replace(answer, status="certified")
+            return proposal.share, replace(answer, status="certified")
         doubted.append(replace(answer, reason=report.reason))
         if report.verdict == "unknown":
-            unsure.append(answer)
+            unsure.append((proposal.share, answer))
         if task.budget.over:
-            return None
-    for answer in unsure:
+            break
+    for share, answer in unsure:
         if not task.budget.over and _check(task, answer, PATIENT_CHECK).verdict == "certified":
             doubted.pop()
-            return replace(answer, status="certified")
-    return None
+            return share, replace(answer, status="certified")
+    return 0.0, GraspSolution(status="none_found")
 
 
 def _check(task: RelativeProblem, answer: GraspSolution, seconds: float) -> GraspReport:
-    limit = min(seconds, task.budget.left)
-    return verify_grasp(task.problem, answer.path, answer.facets, full=False, time_limit=limit)
+    return verify_grasp(
+        task.problem, answer.path, answer.facets, full=False, time_limit=seconds, budget=task.budget
+    )
 
 
 def _without_certificate(task: RelativeProblem, doubted: list[GraspSolution]) -> GraspSolution:
@@ -95,12 +106,14 @@ def _answer(task: RelativeProblem, proposal: Proposal) -> GraspSolution:
         starts=frame.radius * proposal.starts @ rotation(frame.pose[2]).T,
         objective=acceleration(path) if task.by_acceleration else proposal.area * frame.radius**2,
         method=proposal.method,
+        reason="" if proposal.share == 1 else f"keeps within {proposal.share:.3g} of the half-ranges",
     )
 
 
 METHODS: dict[GraspMethod, Callable[[RelativeProblem], Iterable[Iterator[Proposal]]]] = {
     "goal_cell": lambda task: (
         islice(goal_cells(task), MOST_CELLS),
+        narrower(task),
         islice(decomposed(task), MOST_CHECKS),
     ),
     "decomposed": lambda task: (islice(decomposed(task), MOST_CHECKS),),

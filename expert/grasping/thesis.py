@@ -16,6 +16,7 @@ import itertools
 from collections.abc import Iterator, Sequence
 from typing import Literal
 
+from expert.budget import Budget
 from expert.geometry.pose import Array
 from expert.grasping.cell import GoalCell
 from expert.grasping.decomposed import Topology, fillings, path_of, topology_of
@@ -24,6 +25,8 @@ from expert.loops.model import Knot
 
 BEND_WEIGHT = 0.1
 """Weight of accelerations in the sum norm against alpha (both in enclosing radii)."""
+PROGRAM_SHARE = 0.2
+"""Share of the time that each program may take."""
 MOST_CUTS = 6
 """Solutions that each program gives before it is left."""
 Name = Literal["miqp1", "miqp2"]
@@ -37,14 +40,14 @@ def finish(model: NestedCages, name: Name) -> None:
 
 
 def solutions(
-    geometry: FacetGeometry, grasps: Sequence[GoalCell], knots: Sequence[Knot], name: Name, seconds: float
+    geometry: FacetGeometry, grasps: Sequence[GoalCell], knots: Sequence[Knot], name: Name, budget: Budget
 ) -> Iterator[tuple[Topology, Array]]:
     """Topologies and paths (K, N, 2), the best first; each is cut off when the next one is asked for."""
-    order = itertools.count()
+    order, seconds = itertools.count(), PROGRAM_SHARE * budget.left
     queue: list[tuple[float, int, int, NestedCages, Array]] = []
 
     def push(model: NestedCages, cuts: int) -> None:
-        answer = model.milp.solve("highs", gap=0.01, time_limit=seconds)
+        answer = model.milp.solve("highs", gap=0.01, time_limit=budget.part(seconds).left)
         if answer.x is not None:
             value = float(model.milp.form().q @ answer.x)
             heapq.heappush(queue, (value, next(order), cuts, model, answer.x))
@@ -54,6 +57,8 @@ def solutions(
         for hubs in fillings(grasp):
             programs.setdefault(hubs, []).append(grasp)
     for hubs, alike in programs.items():
+        if budget.over:
+            return
         model = NestedCages(geometry, alike, knots, hubs=hubs)
         if model.feasible:
             model.minimise_bends(1.0 if name == "miqp1" else BEND_WEIGHT)

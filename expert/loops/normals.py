@@ -39,8 +39,12 @@ def _ray(count: int, support: tuple[int, ...], weights: Array) -> Array:
     return ray
 
 
-def spans(normals: Array, by: float = PARALLEL) -> bool:
-    """Whether the normals positively span the plane: no gap between neighbours is wider than half a turn less `by` [rad]."""
+def spans(normals: Array) -> bool:
+    """Whether the normals positively span the plane: all gaps between neighbours are narrower than half a turn."""
+    return widest_gap(normals) < np.pi - PARALLEL
+
+
+def widest_gap(normals: Array) -> float:
+    """Largest angle [rad] between neighbouring directions (N, 2)."""
     angles = np.sort(np.arctan2(normals[:, 1], normals[:, 0]))
-    gaps = np.diff(np.append(angles, angles[0] + 2 * np.pi))
-    return bool(gaps.max() < np.pi - by)
+    return float(np.diff(np.append(angles, angles[0] + 2 * np.pi)).max())

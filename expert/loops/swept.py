@@ -55,8 +55,19 @@ class SweptGeometry:
         eroded = [[self._shared(i, j, 0.0, 0.0, self.clearance) for j in range(n)] for i in range(n)]
         return np.array([[_has_area(polygon) for polygon in row] for row in eroded])
 
+    @cached_property
+    def _known(self) -> dict[tuple[float, ...], dict[tuple[int, int], HalfPlanes]]:
+        """Sets by the range and clearance that they were asked for: models of one object ask again and again."""
+        return {}
+
     def common(self, low: float, high: float, clearance: float) -> dict[tuple[int, int], HalfPlanes]:
         """Points in both of two pieces that meet at all angles in [low, high], as {x : A x <= b}; none: 0 <= -1."""
+        key = low, high, clearance
+        if key not in self._known:
+            self._known[key] = self._common(*key)
+        return self._known[key]
+
+    def _common(self, low: float, high: float, clearance: float) -> dict[tuple[int, int], HalfPlanes]:
         sets = {}
         for i, j in zip(*np.nonzero(self.meeting), strict=True):
             shared = self._shared(i, j, low, high, clearance)
@@ -76,12 +87,17 @@ class SweptGeometry:
 
     def overlaps(self, low: float, high: float) -> dict[tuple[int, int], HalfPlanes]:
         """Non-empty K_ij over [low, high], eroded, as {x : A x <= b}."""
-        sets = {}
-        for key, polygon in self.differences.items():
-            swept = swept_inside(polygon, low, high, self.clearance)
-            if _has_area(swept):
-                sets[key] = half_planes(_simplified(cleaned(swept)))
-        return sets
+        if (low, high) not in self._known:
+            swept = {
+                key: swept_inside(polygon, low, high, self.clearance)
+                for key, polygon in self.differences.items()
+            }
+            self._known[low, high] = {
+                key: half_planes(_simplified(cleaned(polygon)))
+                for key, polygon in swept.items()
+                if _has_area(polygon)
+            }
+        return self._known[low, high]
 
     @cached_property
     def regions(self) -> list[Region]:

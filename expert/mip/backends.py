@@ -4,6 +4,7 @@ A time_limit is processor time (`expert.budget`) from the call on, with what it 
 """
 
 import importlib
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -20,6 +21,8 @@ from expert.geometry.pose import Array
 
 Status = Literal["optimal", "feasible", "infeasible", "limit", "failed"]
 Solver = Literal["scip", "highs", "gurobi"]
+PATIENCE = 1.1
+"""HiGHS may take so many times its limit in wall time, for each process that runs on a core."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,9 +142,9 @@ def highs(form: StandardForm, gap: float, time_limit: float) -> Answer:
     is_mip = bool(form.integral.any())
     for option, value in {"output_flag": False, "mip_rel_gap": gap, "threads": 1}.items():
         model.setOptionValue(option, value)
+    model.passModel(_highs_model(form))
     if np.isfinite(time_limit):
         _stop_when_over(model, budget)
-    model.passModel(_highs_model(form))
     model.run()
     info, word = model.getInfo(), model.getModelStatus().name
     found = info.primal_solution_status == 2  # kSolutionStatusFeasible
@@ -163,7 +166,10 @@ def highs(form: StandardForm, gap: float, time_limit: float) -> Answer:
 
 
 def _stop_when_over(model: _Highs, budget: Budget) -> None:
-    """Interrupt it by our clock: its own limit is wall time, which depends on the machine's load."""
+    """Interrupt it by our clock: its own limit is wall time, which depends on the machine's load.
+
+    At the root of a tree it asks nobody for long, so that its own limit is set as well, as late as that load lets expect.
+    """
 
     def stop(kind: object, message: str, seen: object, answer: Any, data: object) -> None:
         answer.user_interrupt = budget.over
@@ -172,6 +178,8 @@ def _stop_when_over(model: _Highs, budget: Budget) -> None:
     kinds = highspy.cb.HighsCallbackType
     for kind in (kinds.kCallbackMipInterrupt, kinds.kCallbackSimplexInterrupt, kinds.kCallbackIpmInterrupt):
         model.startCallback(kind)
+    processes_per_core = os.getloadavg()[0] / (os.cpu_count() or 1)
+    model.setOptionValue("time_limit", PATIENCE * max(processes_per_core, 1.0) * budget.left)
 
 
 def _highs_model(form: StandardForm) -> highspy.HighsLp:

@@ -192,3 +192,9 @@ def _ring(rng: np.random.Generator) -> Array:
     t = np.linspace(0, 2 * np.pi - opening, int(rng.integers(12, 25)))
     arc = 0.5 * np.column_stack([np.cos(t), np.sin(t)])
     return np.concatenate([arc, inner * arc[::-1]])
+
+
+def regular_polygon(facets: int, radius: float) -> Array:
+    """All facets alike."""
+    turns = 2 * np.pi * (np.arange(facets) + 0.1) / facets
+    return radius * np.column_stack([np.cos(turns), np.sin(turns)])

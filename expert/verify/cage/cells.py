@@ -18,6 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
+from expert.budget import UNLIMITED, Budget
+from expert.errors import OutOfTime
 from expert.geometry.cover import clip, half_planes, overlapping_cover
 from expert.geometry.polygon import simple_polygon
 from expert.geometry.pose import Array, rotation
@@ -83,6 +85,7 @@ class CellComplex:
     slack: inner shapes are eroded by this length [m] more, so that they stay obstacles wherever fingers move by less.
     window: a box of relative positions; what leaves it counts as unbounded (default: far beyond all obstacles).
     on_grid: overlays on a grid of GRID, robust and slower, instead of in plain doubles.
+    budget: once it is over, asking for another cell raises OutOfTime.
     """
 
     def __init__(
@@ -92,8 +95,9 @@ class CellComplex:
         *,
         window: shapely.Polygon | None = None,
         on_grid: bool = False,
+        budget: Budget = UNLIMITED,
     ) -> None:
-        self._arrangement, self._slack, self._window = arrangement, slack, window
+        self._arrangement, self._slack, self._window, self._budget = arrangement, slack, window, budget
         self._grid = GRID if on_grid else None
         self.frame = Frame.of(arrangement.shape, arrangement.pose)
         self.fingers = self.frame.relative(arrangement.fingers)
@@ -108,7 +112,9 @@ class CellComplex:
 
     def on_grid(self) -> "CellComplex":
         """The same cells, not yet computed, on a grid."""
-        return CellComplex(self._arrangement, self._slack, window=self._window, on_grid=True)
+        return CellComplex(
+            self._arrangement, self._slack, window=self._window, on_grid=True, budget=self._budget
+        )
 
     def _far_box(self) -> shapely.Polygon:
         obstacles = np.concatenate([self.fingers, self.walls.reshape(-1, 2), np.zeros((1, 2))])
@@ -158,6 +164,8 @@ class CellComplex:
         return self._passages[a, b]
 
     def _free(self, cell: Cell, shape: SweptShape) -> Components:
+        if self._budget.over:
+            raise OutOfTime("the budget was spent before all cells were known")
         obstacles = self._obstacles(shape, sum(cell.bounds) / 2)
         free = _outside(self.box, obstacles, self._grid, one_by_one=self._window is not None)
         polygons = shapely.get_parts(np.array([free]))

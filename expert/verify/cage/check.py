@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from expert.budget import Budget
-from expert.errors import InvalidProblem
+from expert.errors import InvalidProblem, OutOfTime
 from expert.problems.cage import Arrangement, CageProblem, CageSolution
 from expert.verify.cage.claims import CLAIMED, unmet_claim
 from expert.verify.cage.report import CageReport
@@ -31,6 +31,7 @@ def verify_cage(
     finest: float = np.radians(1 / 512),
     cell_budget: int = CELL_BUDGET,
     within: tuple[float, float] | None = None,
+    time_limit: float = np.inf,
 ) -> CageReport:
     """Decide whether the object can leave its obstacles.
 
@@ -38,15 +39,18 @@ def verify_cage(
     as given.  range_resolution: width [rad] to which the ends of a cage's rotation range are located.  finest: smallest
     half-width [rad] of a cell (1/512 degree at least).  cell_budget: cells after which the answer is UNKNOWN.
     within: orientations [rad], relative to the start, that the cage is expected to keep: looked at more closely where it
-    seems to leave them.
+    seems to leave them.  time_limit [s]: processor time after which the answer is UNKNOWN.
     """
-    budget = Budget(np.inf)
-    search = CageSearch(arrangement, slack, max(1, round(2 * finest / UNIT)))
-    verdict, path = search.run(range_resolution, cell_budget, within)
-    doubted = search.faults > 0 if verdict == "unknown" else verdict == "caged" and not search.holds_on_grid()
-    if doubted:
-        search = CageSearch(arrangement, slack, search.finest, on_grid=True)
+    budget, unit = Budget(time_limit), max(1, round(2 * finest / UNIT))
+    search = CageSearch(arrangement, slack, unit, budget)
+    try:
         verdict, path = search.run(range_resolution, cell_budget, within)
+        failed = verdict == "unknown" and search.faults > 0
+        if failed or (verdict == "caged" and not search.holds_on_grid()):
+            search = CageSearch(arrangement, slack, unit, budget, on_grid=True)
+            verdict, path = search.run(range_resolution, cell_budget, within)
+    except OutOfTime:
+        return CageReport(verdict="unknown", seconds=budget.spent, reason="the time limit was reached")
     return CageReport(
         verdict=verdict,
         cells=search.complex.evaluated,

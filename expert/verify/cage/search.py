@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 import shapely
 
+from expert.budget import UNLIMITED, Budget
 from expert.geometry.pose import Array
 from expert.problems.cage import Arrangement
 from expert.verify.cage.cells import COARSEST, START, TURN, Cell, CellComplex, Components
@@ -27,10 +28,18 @@ MOST_ROUNDS, PATIENCE = 300, 40
 class CageSearch:
     """Cells in cyclic order (`ahead`, `behind`) and floods through their inner and outer components."""
 
-    def __init__(self, arrangement: Arrangement, slack: float, finest: int, *, on_grid: bool = False) -> None:
+    def __init__(
+        self,
+        arrangement: Arrangement,
+        slack: float,
+        finest: int,
+        budget: Budget = UNLIMITED,
+        *,
+        on_grid: bool = False,
+    ) -> None:
         self.arrangement = arrangement
         self.finest = finest
-        self.complex = CellComplex(arrangement, slack, on_grid=on_grid)
+        self.complex = CellComplex(arrangement, slack, on_grid=on_grid, budget=budget)
         ring = [START, *(Cell(s, COARSEST) for s in range(0, TURN, COARSEST)), START]
         self.ahead = dict(itertools.pairwise(ring))
         self.behind = {b: a for a, b in self.ahead.items()}
@@ -45,6 +54,7 @@ class CageSearch:
         """Refine until a flood of the inner components stays bounded or one of the outer components escapes.
 
         within [rad], relative to the start: a cage that seems to reach beyond is refined where it leaves this range.
+        Raises OutOfTime.
         """
         nowhere = np.empty((0, 3))
         for turn in range(MOST_ROUNDS):

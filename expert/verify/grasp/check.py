@@ -18,8 +18,8 @@ from functools import partial
 
 import numpy as np
 
-from expert.budget import Budget
-from expert.errors import InvalidProblem, SolverFailed
+from expert.budget import UNLIMITED, Budget
+from expert.errors import InvalidProblem, OutOfTime, SolverFailed
 from expert.geometry.pose import Array, wrapped
 from expert.problems.cage import START_TOLERANCE
 from expert.problems.grasp import GraspProblem, GraspSolution
@@ -81,16 +81,17 @@ def verify_grasp(
     starts: Array = NO_STARTS,
     full: bool = True,
     time_limit: float = 20.0,
+    budget: Budget = UNLIMITED,
 ) -> GraspReport:
     """Decide whether fingers along straight lines between knots (K, N, 2) [m] bring all of Q0 to the goal.
 
     facets: the one that each finger claims to touch in the end; starts (M, 2) [m]: polygon of translations from the goal, at
     its orientation, that are claimed to be in Q0; empty: no claim.  full: report on all parts although one
-    has failed.  time_limit [s]: processor time for what can be reached.
+    has failed.  time_limit [s]: processor time for what can be reached.  budget: for all parts.
     Raises InvalidProblem for a path that does not fit the problem.
     """
     knots = readonly(path, (len(problem.half_ranges), problem.count, 2), "fingers.path")
-    check = _Check(problem, FingerPath(problem.shape, problem.pose, knots), tuple(facets), starts)
+    check = _Check(problem, FingerPath(problem.shape, problem.pose, knots), tuple(facets), starts, budget)
     return check.run(full, time_limit)
 
 
@@ -98,9 +99,15 @@ class _Check:
     """The parts of one verification, the cheap ones first, and what they have found so far."""
 
     def __init__(
-        self, problem: GraspProblem, path: FingerPath, facets: tuple[int, ...], starts: Array
+        self,
+        problem: GraspProblem,
+        path: FingerPath,
+        facets: tuple[int, ...],
+        starts: Array,
+        budget: Budget,
     ) -> None:
         self.problem, self.path, self.facets, self.starts = problem, path, facets, starts
+        self.budget = budget
         self.refuted: list[str] = []
         self.doubts: list[str] = []
         self.spent: dict[str, float] = {}
@@ -122,7 +129,10 @@ class _Check:
         }
         for name, step in steps.items():
             part = Budget(np.inf)
-            step()
+            try:
+                step()
+            except OutOfTime:
+                self.doubts.append("the time limit was reached")
             self.spent[name] = part.spent
             if (self.refuted or self.doubts) and (name == "path" or not full):
                 break
@@ -170,6 +180,7 @@ class _Check:
                 range_resolution=KNOT_RESOLUTION,
                 finest=KNOT_RESOLUTION / 2,
                 within=(-half, half),
+                time_limit=self.budget.left,
             )
             if report.rotation_range is not None:
                 ranges[k] = np.array(report.rotation_range) - self.problem.pose[2]
@@ -182,7 +193,7 @@ class _Check:
 
     def check_start(self) -> None:
         """Q0, and that the starts claimed are in it."""
-        self.start = StartSet(self.path)
+        self.start = StartSet(self.path, self.budget)
         if len(self.starts) < 3:
             return
         free, known = self.start.holds(self.starts)
@@ -194,11 +205,11 @@ class _Check:
     def check_dead_ends(self, time_limit: float) -> None:
         """What can be reached from Q0 stays bounded, meets no dead end, and is the goal alone in the end."""
         try:
-            events = dead_end_events(self.path)
+            events = dead_end_events(self.path, self.budget)
         except SolverFailed as error:
             self.doubts.append(str(error))
             return
-        budget = Budget(time_limit)
+        budget = self.budget.part(time_limit)
         tube, pockets = Tube(leak=(0.0, 0.0)), self._pockets(events)
         for coarsest in (COARSEST >> (2 * k) for k in range(ROUNDS)):
             finer = self._tube(coarsest, budget, pockets)
@@ -251,7 +262,7 @@ class _Check:
         """State what is refuted or in doubt."""
         if tube.leak is not None:
             low, high = tube.leak
-            report = verify_cage(self.path.arrangement(0.5 * (low + high)))
+            report = verify_cage(self.path.arrangement(0.5 * (low + high)), time_limit=self.budget.left)
             if report.verdict == "escapes":
                 self.refuted.append(f"the object can escape at s = {0.5 * (low + high):.6g}")
             else:
@@ -267,7 +278,9 @@ class _Check:
         """Whether the contacts exclude everything but the goal among what can be reached at the end."""
         end, before = self.path.last, tube.slabs[-1]
         for ring in (before.ring, uniform_ring(FINEST)):
-            last = settled_slab(self.path, end, end, ring, before.reached, self.isolation.angle)
+            last = settled_slab(
+                self.path, end, end, ring, before.reached, self.isolation.angle, budget=self.budget
+            )
             if last is not None and self.isolation.holds_in(last.shift, *last.range):
                 return True
         return False

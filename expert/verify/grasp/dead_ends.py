@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from expert.errors import SolverFailed
+from expert.budget import UNLIMITED, Budget
+from expert.errors import OutOfTime, SolverFailed
 from expert.geometry.polygon import signed_distance
 from expert.geometry.pose import Array, rotation
-from expert.verify.grasp.event_kernel import EVENT, TOUCH, Candidates, closing_contacts
+from expert.verify.grasp.event_kernel import EVENT, TOUCH, Candidates, closing_with
 from expert.verify.grasp.finger_path import FingerPath
 
 AT_GOAL = 1e-6
@@ -42,20 +43,20 @@ class DeadEndEvent:
         return self.configurations(count + 2)[1:-1]
 
 
-def dead_end_events(path: FingerPath) -> list[DeadEndEvent]:
+def dead_end_events(path: FingerPath, budget: Budget = UNLIMITED) -> list[DeadEndEvent]:
     """All dead ends along a finger path but the goal itself, reachable or not, in order of s.
 
     Nested cages may contain some, in which starts get stuck: what 5.2 Remark 1 overlooks.
 
-    Raises SolverFailed where there are more than can be listed.
+    Raises SolverFailed where there are more than can be listed, OutOfTime where the budget is over before they are known.
     """
-    contacts, events = _closing(path)
+    contacts, events = _closing(path, budget)
     free = [(event, interval) for event in events for interval in _free_intervals(path, event)]
     ends = [_dead_end(path, contacts, event, interval) for event, interval in free]
     return _distinct([end for end in ends if not _is_passed(path, end)])
 
 
-def _closing(path: FingerPath) -> tuple[np.ndarray, np.ndarray]:
+def _closing(path: FingerPath, budget: Budget) -> tuple[np.ndarray, np.ndarray]:
     """Contacts (C, 2) and the kernel's events (EVENT)."""
     facets, fingers = path.facets, path.knots.shape[1]
     count = len(facets.offsets)
@@ -65,7 +66,11 @@ def _closing(path: FingerPath) -> tuple[np.ndarray, np.ndarray]:
     compatible = (finger[:, None] != finger[None]) | after | after.T
     events = np.empty(MOST, EVENT)
     candidates = Candidates(contacts, compatible, facets, np.ascontiguousarray(path.knots))
-    found = closing_contacts(candidates, events)
+    found = 0
+    for first in range(len(contacts)):
+        if budget.over:
+            raise OutOfTime("the budget was spent before all dead ends were known")
+        found = closing_with(candidates, first, events, found)
     if found == MOST:
         raise SolverFailed(f"more than {MOST} dead ends: the finger path is degenerate")
     return contacts, events[:found]

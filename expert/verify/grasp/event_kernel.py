@@ -69,24 +69,32 @@ def closing_contacts(candidates: Candidates, events: np.ndarray) -> int:
 
     Fingers that take no part are not looked at.  As many events as there are places may mean that some are missing.
     """
-    compatible, count = candidates.compatible, 0
+    count = 0
+    for first in range(len(candidates.compatible)):
+        count = closing_with(candidates, first, events, count)
+    return count
+
+
+@numba.njit(cache=True)
+def closing_with(candidates: Candidates, first: int, events: np.ndarray, count: int) -> int:
+    """The same for sets whose first contact this is, after so many events that are there; returns how many there are then."""
+    compatible = candidates.compatible
     ids = np.empty(4, np.int64)
-    for a in range(len(compatible)):
-        ids[0] = a
-        for b in np.flatnonzero(compatible[a]):
-            if b <= a:
+    ids[0] = first
+    for b in np.flatnonzero(compatible[first]):
+        if b <= first:
+            continue
+        ids[1] = b
+        count = _append(ids[:2], candidates, events, count)
+        for c in np.flatnonzero(compatible[first] & compatible[b]):
+            if c <= b:
                 continue
-            ids[1] = b
-            count = _append(ids[:2], candidates, events, count)
-            for c in np.flatnonzero(compatible[a] & compatible[b]):
-                if c <= b:
-                    continue
-                ids[2] = c
-                count = _append(ids[:3], candidates, events, count)
-                for d in np.flatnonzero(compatible[a] & compatible[b] & compatible[c]):
-                    if d > c:
-                        ids[3] = d
-                        count = _append(ids, candidates, events, count)
+            ids[2] = c
+            count = _append(ids[:3], candidates, events, count)
+            for d in np.flatnonzero(compatible[first] & compatible[b] & compatible[c]):
+                if d > c:
+                    ids[3] = d
+                    count = _append(ids, candidates, events, count)
     return count
 
 

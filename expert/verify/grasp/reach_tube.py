@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import shapely
 
-from expert.budget import Budget
+from expert.budget import UNLIMITED, Budget
+from expert.errors import OutOfTime
 from expert.geometry.pose import Array
 from expert.verify.cage.cells import DEGREE, TURN, Cell
 from expert.verify.cage.search import UNIT
@@ -62,7 +63,7 @@ def reach_tube(
     tube = Tube()
     first_round = coarsest == COARSEST
     longest, shortest = (np.inf, 10 * LEAST_SLACK) if first_round else (2 * coarsest * UNIT, LEAST_SLACK)
-    first = first_slab(path, coarsest, limits[0], pockets.at(0.0, 0.0))
+    first = first_slab(path, coarsest, limits[0], pockets.at(0.0, 0.0), budget)
     if first is None:
         tube.leak = 0.0, 0.0
         return tube
@@ -72,7 +73,7 @@ def reach_tube(
         knot = float(int(s) + 1)
         stride = min(stride, longest / max(_motion(path, knot - 1, knot), LEAST_SLACK))
         high = s + stride if stride < 0.999 * (knot - s) else knot
-        slab = settled_slab(path, s, high, ring, sources, limits[int(s)], pockets.at(s, high))
+        slab = settled_slab(path, s, high, ring, sources, limits[int(s)], pockets.at(s, high), budget)
         if slab is None:
             stride = 0.5 * (high - s)
         if budget.over or (slab is None and _motion(path, s, high) < 2 * shortest):
@@ -84,18 +85,18 @@ def reach_tube(
     return tube
 
 
-def first_slab(path: FingerPath, coarsest: int, limit: float, avoid: Array) -> Slab | None:
+def first_slab(path: FingerPath, coarsest: int, limit: float, avoid: Array, budget: Budget) -> Slab | None:
     """What is reached at s = 0 from the goal, in cells that are fine only where they must be.
 
     The way of a leak that begins at the goal says little about where cells are too wide, so all of them are halved.  One
     that begins at what is known to be enough says more: coarse cells are tried once more from there.
     """
     ring = uniform_ring(coarsest)
-    fine = settled_slab(path, 0.0, 0.0, ring, NEAR_GOAL, limit, avoid, confirmed=False)
+    fine = settled_slab(path, 0.0, 0.0, ring, NEAR_GOAL, limit, avoid, budget, confirmed=False)
     if fine is None:
         return None
-    sparse = settled_slab(path, 0.0, 0.0, ring, fine.reached, limit, avoid, confirmed=False)
-    return settled_slab(path, 0.0, 0.0, (sparse or fine).ring, NEAR_GOAL, limit, avoid)
+    sparse = settled_slab(path, 0.0, 0.0, ring, fine.reached, limit, avoid, budget, confirmed=False)
+    return settled_slab(path, 0.0, 0.0, (sparse or fine).ring, NEAR_GOAL, limit, avoid, budget)
 
 
 def settled_slab(
@@ -106,14 +107,24 @@ def settled_slab(
     sources: Reached,
     limit: float,
     avoid: Array = NONE.configurations,
+    budget: Budget = UNLIMITED,
     *,
     confirmed: bool = True,
 ) -> Slab | None:
     """What is reached in [low, high] from sources at low; None where it is not held with cells as fine as the motion.
 
     Overlays in plain doubles find the cells that are needed, and overlays on a grid confirm what they find.
+    Nor is it where the budget is over before that is known.
     """
-    flood = SlabFlood(path, low, high, ring, _around(sources))
+    try:
+        return _settled(
+            SlabFlood(path, low, high, ring, _around(sources), budget), sources, limit, avoid, confirmed
+        )
+    except OutOfTime:
+        return None
+
+
+def _settled(flood: SlabFlood, sources: Reached, limit: float, avoid: Array, confirmed: bool) -> Slab | None:
     finest = FINEST
     while finest * UNIT <= flood.slack and finest < COARSEST:
         finest *= 2

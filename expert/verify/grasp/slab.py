@@ -13,6 +13,7 @@ from itertools import count
 import numpy as np
 import shapely
 
+from expert.budget import Budget
 from expert.geometry.pose import Array, wrapped
 from expert.verify.cage.cells import TURN, Cell, CellComplex
 from expert.verify.cage.search import UNIT
@@ -97,13 +98,19 @@ class SlabFlood:
     """
 
     def __init__(
-        self, path: FingerPath, low: float, high: float, ring: list[Cell], window: shapely.Polygon | None
+        self,
+        path: FingerPath,
+        low: float,
+        high: float,
+        ring: list[Cell],
+        window: shapely.Polygon | None,
+        budget: Budget,
     ) -> None:
         motion = float(np.linalg.norm(path.fingers(high) - path.fingers(low), axis=1).max())
         self.low, self.high, self.on_grid = low, high, False
         self.slack = 0.5 * motion
         middle = path.arrangement(0.5 * (low + high))
-        self.space = CellComplex(middle, self.slack * path.frame.radius, window=window)
+        self.space = CellComplex(middle, self.slack * path.frame.radius, window=window, budget=budget)
         self.ring = ring
         self.came_from: dict[Node, Node | None] = {}
 

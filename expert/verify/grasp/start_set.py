@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from expert.budget import UNLIMITED, Budget
 from expert.geometry.pose import Array
 from expert.verify.cage.cells import DEGREE, START, TURN, Cell, CellComplex
 from expert.verify.grasp.finger_path import FingerPath
@@ -21,9 +22,9 @@ SEAM = 1e-6
 class StartSet:
     """Free prisms (polygon of positions times cell of orientations) that hang together with the goal, from inside."""
 
-    def __init__(self, path: FingerPath, *, width: int = WIDTH) -> None:
+    def __init__(self, path: FingerPath, budget: Budget = UNLIMITED, *, width: int = WIDTH) -> None:
         self.path, self.width = path, width
-        self._cells = CellComplex(path.arrangement(0.0), on_grid=True)
+        self._cells = CellComplex(path.arrangement(0.0), on_grid=True, budget=budget)
         self._prisms = self._flood()
 
     def _flood(self) -> dict[Cell, list[int]]:

@@ -78,12 +78,13 @@ def test_a_wide_range_needs_cages_that_are_no_goal_cells() -> None:
 def test_the_thesis_conditions_alone_admit_a_grasp_that_jams() -> None:
     task = problem(Shape(vertices=irregular_polygon(np.random.default_rng(8), 6)), 30.0)
     search = RelativeProblem(task, Budget(FOREVER))
-    verdicts = []
-    for proposal, _ in zip(decomposed(search), range(3), strict=False):
+    verdicts: set[str] = set()
+    for proposal in itertools.islice(decomposed(search), 12):
         path = search.frame.world(proposal.path)
-        verdicts.append(verify_grasp(task, path, proposal.facets, full=False, time_limit=4.0).verdict)
-    assert "refuted" in verdicts
-    assert "certified" in verdicts
+        verdicts.add(verify_grasp(task, path, proposal.facets, full=False, time_limit=4.0).verdict)
+        if verdicts >= {"refuted", "certified"}:
+            break
+    assert verdicts >= {"refuted", "certified"}
 
 
 def test_a_wish_for_large_starts_enlarges_them() -> None:
@@ -121,7 +122,7 @@ def test_nested_cages_overlap_all_the_way_and_are_shut_at_their_limits() -> None
     geometry = FacetGeometry(frame.body(shape.vertices), 0.002)
     knots = schedule(ranges, 0.002)
     grasp = GoalCell(geometry.table, (1, 2, 3, 0), 1, 0, 0.002)
-    found = list(topologies(geometry, grasp, knots, 5.0))
+    found = list(topologies(geometry, grasp, knots, Budget(5.0)))
     assert found
     path = smooth_path(geometry, found[0], knots, 0.98)
     assert path is not None
