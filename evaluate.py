@@ -14,7 +14,8 @@ from hydra.utils import instantiate
 from omegaconf import DictConfig
 from rich.console import Console
 
-from datasets.entry import entry_point, swept
+from datasets.entry import entry_point, listed, swept
+from datasets.limits import Number
 from dlm.evaluation.baselines import unlearned
 from dlm.evaluation.extras import read_extras
 from dlm.evaluation.report import FILES
@@ -30,15 +31,15 @@ build = partial(instantiate, _convert_="object")
 @entry_point("evaluate")
 def main(cfg: DictConfig) -> None:
     """Rebuild every policy from its checkpoint, execute its actions, write tables and report."""
-    require(len(cfg.seeds) > 0, "seeds", "at least one seed", list(cfg.seeds), "seeds=[0]")
-    require(
-        len(cfg.stages) > 0, "stages", "at least one stage", list(cfg.stages), "stages=[nn,nnm,mdr,cvx,dlm]"
-    )
+    seeds = listed(cfg.seeds, "seeds", "seeds=[0]")
+    stages = listed(cfg.stages, "stages", "stages=[nn,nnm,mdr,cvx,dlm]")
+    films = Number(whole=True, least=0)
+    require(films.holds(cfg.examples), "examples", str(films), cfg.examples)
     known = ("running", "settled")
     require(cfg.batch_norm in known, "batch_norm", " or ".join(known), cfg.batch_norm)
     torch.set_num_threads(1)
     tasks, extras = first(read_all(cfg.data), cfg.tasks), read_extras(cfg.extras)
-    trained = [read_trained(cfg.output, stage, cfg.seeds, build) for stage in cfg.stages]
+    trained = [read_trained(cfg.output, stage, seeds, build) for stage in stages]
     study = Study(
         trained=[one.settled(tasks) for one in trained] if cfg.batch_norm == "settled" else trained,
         tasks=tasks,
@@ -47,7 +48,7 @@ def main(cfg: DictConfig) -> None:
     )
     command = shlex.join(["python", Path(sys.argv[0]).name, *sys.argv[1:]])
     data = {name: batch.fingerprint for name, batch in tasks.items()}
-    origin = {"command": command, "seeds": list(cfg.seeds), "data (sha256)": data}
+    origin = {"command": command, "seeds": seeds, "data (sha256)": data}
     with ExitStack() as stack:
         place = stack.enter_context(folder(Path(cfg.results or cfg.output) / swept("results", "output")))
         outputs = {name: stack.enter_context(Output(place / name)) for name in FILES}

@@ -12,11 +12,10 @@ from hydra.core.hydra_config import HydraConfig
 from hydra.utils import instantiate
 from omegaconf import DictConfig, OmegaConf
 
-from datasets.entry import entry_point, swept
+from datasets.entry import entry_point, listed, swept
 from dlm.evaluation.watch import watch
 from dlm.tasks import read_all
 from dlm.training.orchestrate import Run, seed_folder, train
-from expert.world.values import require
 
 build = partial(instantiate, _convert_="object")
 
@@ -24,8 +23,7 @@ build = partial(instantiate, _convert_="object")
 @entry_point("train")
 def main(cfg: DictConfig) -> None:
     """Train the chosen stages on the chosen seeds, each after the one whose weights it starts from."""
-    seeds = [cfg.seed] if cfg.seeds is None else list(cfg.seeds)
-    require(len(seeds) > 0, "seeds", "at least one seed", seeds, "seeds=[0,1,2]")
+    seeds = listed(cfg.seed if cfg.seeds is None else cfg.seeds, "seeds", "seeds=[0,1,2]")
     output = Path(cfg.output) / swept("seed", "stage", "output")
     runs = [run_of(cfg, seed, output) for seed in seeds]
     for line in train(runs, jobs=cfg.jobs):

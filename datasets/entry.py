@@ -5,17 +5,18 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import ParamSpec
+from typing import Any, ParamSpec
 
 import hydra
 from hydra.core.hydra_config import HydraConfig
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.errors import HydraException
 from hydra.types import RunMode
-from omegaconf import DictConfig
+from omegaconf import DictConfig, ListConfig
 from omegaconf.errors import OmegaConfBaseException
 
 from expert.errors import ExpertError, InvalidProblem
+from expert.world.values import require
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130
@@ -32,6 +33,13 @@ def entry_point(config: str) -> Callable[[Job], Callable[[], None]]:
         return _one_line(command)
 
     return decorate
+
+
+def listed(value: Any, field: str, example: str) -> list[Any]:
+    """The entries of an option that takes several; one by itself counts as a list.  Raises InvalidProblem for none."""
+    several = list(value) if isinstance(value, ListConfig) else [value]
+    require(len(several) > 0 and value is not None, field, f"at least one of {field}", value, example)
+    return several
 
 
 def swept(*named: str) -> str:

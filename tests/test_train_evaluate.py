@@ -302,9 +302,12 @@ WRONG: dict[str, tuple[Callable[[], None], list[str], str]] = {
     "another model": (TRAIN, [SMOKE, "stage=cvx", BAD], r"mdr\.safetensors: expected"),
     "other settings": (TRAIN, [SMOKE, "stage=nn", BAD, "resume=true", "schedule.learning_rate=1e-3"], r"learning_rate"),
     "nothing trained": (EVALUATE, [SMOKE, "output=nowhere"], r"nowhere/seed_0/nn\.safetensors.*python train\.py stage=nn"),
-    "no stages": (EVALUATE, [SMOKE, "stages=[]"], r"stages: expected at least one stage"),
+    "seeds of letters": (TRAIN, [SMOKE, "seeds=abc"], r"seed: expected a whole number from 0 to"),
+    "half a thread": (TRAIN, [SMOKE, "threads=0.5"], r"threads: expected a whole number from 1 to 1024, got 0\.5"),
+    "films of letters": (EVALUATE, [SMOKE, "examples=all"], r"examples: expected a whole number from 0 on, got all"),
+    "no stages": (EVALUATE, [SMOKE, "stages=[]"], r"stages: expected at least one of stages"),
     "no tasks": (EVALUATE, [SMOKE, "tasks=1"], r"tasks: expected a number of at least 2, got 1"),
-    "no seeds": (EVALUATE, [SMOKE, "seeds=[]"], r"seeds: expected at least one seed"),
+    "no seeds": (EVALUATE, [SMOKE, "seeds=[]"], r"seeds: expected at least one of seeds"),
     "one stage another": (EVALUATE, [SMOKE, BAD], r"mdr\.safetensors: expected stage mdr, got stage nn"),
 }  # fmt: skip
 

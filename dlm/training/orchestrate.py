@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import torch
 
+from datasets.limits import Number, check_numbers
 from datasets.parallel import followed, progress_bar, side_by_side
 from dlm.inverse_dynamics.layer import InverseDynamics
 from dlm.policy import Architecture, Policy
@@ -46,8 +47,11 @@ class Run:
     watch: Callable[[DataSets], Watch]
     folder: Path
     settings: Mapping[str, Any]
-    threads: int = 1
+    threads: Annotated[int, Number(whole=True, least=1, most=1024)] = 1
     resume: bool = False
+
+    def __post_init__(self) -> None:
+        check_numbers(self)
 
     def train(self, stage: Stage, tasks: DataSets) -> str:
         """One stage, from fresh weights or from those of its warm start; a line that says where it is."""

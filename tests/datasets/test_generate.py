@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from datasets.generate import main
+from datasets.store import read_dataset
+
 BAD = {
     "unknown data set": (["dataset=nonsense"], "dataset/nonsense"),
     "unknown key": (["colour=red"], "colour"),
@@ -78,3 +81,16 @@ def test_ray_is_asked_for_where_it_is_missing(tmp_path: Path) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert "pip install certified-manipulation[ray]" in done.stderr
+
+
+def test_a_multirun_makes_a_data_set_for_each_setting(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "1")
+    swept = ["-m", "dataset=smoke", "dataset.count=1", "dataset.tasks.friction=0.5,0.6", "jobs=1"]
+    monkeypatch.setattr(sys, "argv", ["generate.py", *swept])
+    main()
+    made = {folder.name: read_dataset(folder) for folder in (tmp_path / "data").iterdir()}
+    frictions = {name: data[0].task.fingers.friction for name, data in made.items()}
+    assert frictions == {f"smoke-seed0,dataset.tasks.friction={mu}": mu for mu in (0.5, 0.6)}
