@@ -15,6 +15,8 @@ SMOOTH = 1.0
 STEEP = 3.0
 """Grey levels per pixel from which an edge shows a shift."""
 PASSES = 12
+SMALLEST = 0.02
+"""Steps that change nothing any more [pixels]."""
 OUTLIER = 8.0
 """Grey levels beyond which a difference is something that moves by itself."""
 EXPLAINED = 0.5
@@ -51,7 +53,10 @@ def _shift(first: Array, other: Array, where: NDArrayBool) -> Array:
         pull = slopes[seen] * weight[:, None]
         matrix = pull.T @ slopes[seen]
         # Along an edge nothing is seen to move.
-        shift = shift - np.linalg.solve(matrix + 1e-2 * np.trace(matrix) * np.eye(2), pull.T @ error)
+        step = np.linalg.solve(matrix + 1e-2 * np.trace(matrix) * np.eye(2), pull.T @ error)
+        shift = shift - step
+        if np.abs(step).max() < SMALLEST:
+            break
     before, after = (np.square(_difference(first, other, s)) * seen for s in (0 * shift, shift))
     explained = np.argwhere(after < 0.5 * before - OUTLIER**2)
     wide = len(explained) > 0 and (np.ptp(explained, axis=0) > WIDE * np.array(first.shape)).any()
