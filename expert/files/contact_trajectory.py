@@ -4,7 +4,7 @@ The file's body frame may have any origin and list its vertices either way round
 centre of mass and the order counter-clockwise: converted here, once.
 """
 
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from expert.problems.contact import (
 )
 from expert.world.environment import Environment
 from expert.world.fingers import Fingers
-from expert.world.motion import Trajectory
+from expert.world.motion import Ends, Trajectory
 from expert.world.values import IntArray
 from expert.world.walls import HalfPlane
 
@@ -86,7 +86,7 @@ def _read_trajectory(section: Section, com: Array) -> Trajectory:
     poses = moved_origin(section.array("poses", (None, 3)), com)
     if len(poses) < 2:
         raise InvalidProblem(section.path("poses"), expected="at least 2 poses", got=f"{len(poses)}")
-    rule = {"ends": section.text("ends")} if "ends" in section else {}
+    rule: Any = {"ends": section.choice("ends", get_args(Ends))} if "ends" in section else {}
     by_rule = Trajectory.of(poses, section.number("dt", positive=True), **rule)
     outside = {
         key: moved_origin(section.array(key, (3,)), com) if key in section else getattr(by_rule, key)

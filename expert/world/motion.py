@@ -2,11 +2,15 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal, get_args
 
 import numpy as np
 
 from expert.geometry.pose import Array
 from expert.world.values import readonly, require
+
+Ends = Literal["steady", "rest"]
+"""Outside the horizon, constant velocity goes on, or the object is at rest."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,11 +30,11 @@ class Trajectory:
             object.__setattr__(self, name, readonly(getattr(self, name), (3,), f"trajectory.{name}"))
 
     @classmethod
-    def of(cls, poses: object, dt: float, ends: str = "steady") -> "Trajectory":
-        """Poses with the stated end rule: steady (constant velocity goes on) or rest (at rest outside the horizon)."""
+    def of(cls, poses: object, dt: float, ends: Ends = "steady") -> "Trajectory":
+        """Poses with the stated rule for what is outside the horizon."""
         q = readonly(poses, (None, 3), "trajectory.poses")
         require(len(q) >= 2, "trajectory.poses", "at least 2 poses", len(q))
-        require(ends in ("steady", "rest"), "trajectory.ends", "steady or rest", ends)
+        require(ends in get_args(Ends), "trajectory.ends", " or ".join(get_args(Ends)), repr(ends))
         if ends == "rest":
             return cls(dt=dt, poses=q, before=q[0], after=q[-1])
         return cls(dt=dt, poses=q, before=2 * q[0] - q[1], after=2 * q[-1] - q[-2])

@@ -225,6 +225,10 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "facet margin above a half": (edited(("fingers", "facet_margin"), 0.51), "facet_margin: .* 0 to 0.5"),
     "no finger": (edited(("fingers", "count"), 0), "fingers.count"),
     "half a finger": (edited(("fingers", "count"), 1.5), "fingers.count: .* whole number"),
+    "no ends": (
+        edited(("trajectory", "ends"), ""),
+        "trajectory.ends: expected steady or rest, got ''",
+    ),
     "another plane": (
         edited(("environment", "plane"), "frontal"),
         "environment.plane: .* sagittal or transverse",
