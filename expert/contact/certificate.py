@@ -1,4 +1,4 @@
-"""The certificate of a search: multipliers from which a checker proves the bound again without a solver (docs/contact-solver.md)."""
+"""The certificate of a search: multipliers from which a checker proves the bound again without a solver (docs/theory/contact-certificate.md)."""
 
 import base64
 from typing import Any

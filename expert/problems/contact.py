@@ -153,7 +153,7 @@ class Plan:
     status: optimal (gap certified), feasible (budget spent, plan found), infeasible (proved, see `reason`), time_limit (nothing found).
     objective, bound: SI cost and its certified lower bound.  modes (T, C): facet or FREE.
     positions (T, C, 2) [m] and forces (T, C, 2) [N, on the object], world frame.  Empty arrays where there is no plan.
-    certificate: what proves the bound, or that there is no plan (docs/contact-solver.md); None where nothing does.
+    certificate: what proves the bound, or that there is no plan (docs/theory/contact-certificate.md); None where nothing does.
     """
 
     status: Status
