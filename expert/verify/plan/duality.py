@@ -1,8 +1,8 @@
 r"""Lower bounds on the cost of contact plans by weak duality: any multipliers will do, good ones give good bounds.
 
-Lengths are measured over L, forces over m g, costs over (m g)^2; positions from the first centre of mass.  The cost of a plan is
+Lengths are measured over L, forces over m g, costs over a unit; positions from the first centre of mass.  The cost of a plan is
 
-    sum_t sum_c cost(lambda) + w sum |p''|^2,    cost(lambda) = |lambda|^2 - beta (distance from the cone's edge),
+    sum_t sum_c cost(lambda) + w sum |p''|^2,    cost(lambda) = W |lambda|^2 - beta (distance from the cone's edge),
 
 p'' second differences.  With multipliers y_t of the wrench balance and any accelerations a, since |p''|^2 >= 2 a.p'' - |a|^2,
 
@@ -25,8 +25,19 @@ from expert.problems.contact import ContactTask
 
 FAR = 10.0
 """Free fingers are looked for within this distance of the box of finger positions [L]."""
+FREE_FORCES = 1e4
+"""Accelerations of L / dt^2 cost so many units where forces cost nothing."""
 ROUNDING = 1e-12
 """Share of the sum of all terms' sizes that is taken off each bound; so much must a proof of impossibility exceed."""
+
+
+def cost_unit(task: ContactTask) -> float:
+    """What certificates measure costs in [SI]: forces of the object's weight, or accelerations where forces cost nothing."""
+    if task.cost.force > 0:
+        return task.cost.force * task.weight**2
+    if task.cost.acceleration > 0:
+        return task.cost.acceleration * (task.body.size / task.trajectory.dt**2) ** 2 / FREE_FORCES
+    return task.weight**2
 
 
 class Duality:
@@ -51,14 +62,11 @@ class Duality:
                 moment = arm[0] * c.rays[:, 1] - arm[1] * c.rays[:, 0]
                 self._environment[c.step].append((np.column_stack([c.rays, moment]) / scale, c.limit))
         mu = task.fingers.friction
-        self.friction, self.beta = (
-            task.robustness.cone_fraction * mu,
-            task.cost.margin / np.hypot(1, mu) / weight,
-        )
-        self.true_friction = mu
+        self.unit, self.friction, self.true_friction = cost_unit(task), task.robustness.cone_fraction * mu, mu
         self.most, self.least = task.fingers.max_force / weight, task.robustness.min_normal_force / weight
-        self.force_weight = task.cost.force
-        self.smooth_weight = task.cost.acceleration * (L / task.trajectory.dt**2 / weight) ** 2
+        self.force_weight = task.cost.force * weight**2 / self.unit
+        self.smooth_weight = task.cost.acceleration * (L / task.trajectory.dt**2) ** 2 / self.unit
+        self.beta = task.cost.margin * weight / np.hypot(1, mu) / self.unit
         self._walls, self._regions = wall_rows(task), region_rows(task)
         self._box = (workspace(task) - self.origin) / L + FAR * np.array([[-1.0], [1.0]])
         self.free_corners = lru_cache(maxsize=None)(self._free_corners)

@@ -7,7 +7,6 @@ every split into all of its parts, and each part has multipliers whose dual valu
 data from outside: whatever it says, only what these sums show is believed.
 """
 
-import base64
 import binascii
 import itertools
 from typing import Any
@@ -18,29 +17,20 @@ import shapely
 from expert.geometry.convex import free_regions
 from expert.geometry.cover import clip
 from expert.geometry.pose import Array
-from expert.problems.contact import FREE, ContactTask
-from expert.verify.plan.duality import ROUNDING, Duality
+from expert.problems.contact import ContactTask
+from expert.verify.plan.boxes import Boxes, Modes, Regions, Unproved, intervals, numbers, parts
+from expert.verify.plan.duality import ROUNDING, Duality, cost_unit
 from expert.verify.plan.mode_automaton import Automaton, mode, window_costs
 
 CLOSE = 1e-9
 """A bound counts as proved if it is up to this share of itself."""
-LARGEST = 1e60
-"""Of multipliers and accelerations."""
-Modes = tuple[int, ...]
-Regions = dict[tuple[int, int], int]
-Interval = tuple[range, int, int]
-"""Steps of a contact, its finger and facet."""
-
-
-class Unproved(Exception):
-    """Why a certificate does not prove the bound."""
 
 
 def objection(task: ContactTask, certificate: Any, bound: float) -> str:
     """Why a certificate does not prove that no plan costs less than `bound` (SI; inf: that there is none); empty: it does."""
     if not covers_the_outside(task):
         return "the free regions do not cover the outside of the object"
-    target = bound / task.weight**2
+    target = bound / cost_unit(task)
     if np.isfinite(target):
         target -= CLOSE * abs(target)
     try:
@@ -57,6 +47,7 @@ class Walk:
 
     def __init__(self, task: ContactTask, certificate: dict[str, Any]) -> None:
         self.bounds, self.fingers = Duality(task), task.fingers.count
+        self.boxes = Boxes(self.bounds)
         self.moves = Automaton(self.bounds.facets, self.fingers, task.robustness.min_interval)
         if not self.moves.fits:
             raise Unproved("there are too many contact sequences to look at")
@@ -70,7 +61,7 @@ class Walk:
     def _step_costs(self, packed: str) -> Array:
         """Bounds (T, sets) of the force cost of each step with each set of active facets, places anywhere in their ranges."""
         b, sets = self.bounds, self.moves.sets
-        y = _numbers(packed, (b.steps, len(sets), 3))
+        y = numbers(packed, (b.steps, len(sets), 3))
         free = 0.0 if b.beta == 0 else -np.inf  # only the distance from the cone's edge is a reward
         costs = np.empty((b.steps, len(sets)))
         for t, (k, chosen) in itertools.product(range(b.steps), enumerate(sets)):
@@ -106,11 +97,17 @@ class Walk:
             if least + self.to_go[(t, *now)] >= target:
                 continue
             if t == self.bounds.steps - 1:
-                self._require_sequence(prefixes, target)
+                self._require_sequence(np.array(prefixes).T, target)
                 continue
             for after in itertools.product(*(self.moves.follow[s] for s in now)):
                 grown = tuple((*p, mode(s)) for p, s in zip(prefixes, after, strict=True))
                 waiting.append((grown, after, forces + self.step_costs[t, self.moves.active(now, after)]))
+
+    def _require_sequence(self, modes: Array, target: float) -> None:
+        proof = self.sequences.get(tuple(map(tuple, modes.tolist())))
+        if proof is None:
+            raise Unproved(f"the certificate says nothing about the contact sequence {modes.tolist()}")
+        self.boxes.require(modes, proof, target)
 
     def _smoothing(self, path: Modes, state: int) -> float:
         """Least smoothing cost of one finger's modes so far: what the certificate proves, or that of each step by itself."""
@@ -125,125 +122,19 @@ class Walk:
     def _path(self, path: Modes, proof: dict[str, Any], regions: Regions) -> float:
         """Bound of one finger's smoothing cost, by cases of the regions that it is in."""
         if "parts" in proof:
-            step = int(proof["step"])
-            parts = self._parts(proof, self.bounds.regions)
-            return min(self._path(path, part, {**regions, (step, 0): r}) for r, part in enumerate(parts))
-        a = _numbers(proof["accelerations"], (max(len(path) - 2, 0), 1, 2))
+            step, cases = int(proof["step"]), parts(proof, self.bounds.regions)
+            return min(self._path(path, case, {**regions, (step, 0): r}) for r, case in enumerate(cases))
+        a = numbers(proof["accelerations"], (max(len(path) - 2, 0), 1, 2))
         modes = np.array(path)[:, None]
-        spans = self._spans(modes)
+        spans = self.boxes.spans(modes)
         if any(low > high for low, high in spans):
             return np.inf
-        value, size = self._motion(modes, a, regions)
+        value, size = self.boxes.motion(modes, a, regions)
         for (steps, _, f), (low, high) in zip(intervals(modes), spans, strict=True):
             pull = self.bounds.pulls(a[:, 0])
             ends = [sum(float(pull[t] @ self.bounds.place(t, f, r)) for t in steps) for r in (low, high)]
             value, size = value + min(ends), size + max(map(abs, ends))
         return max(0.0, value - ROUNDING * size)
-
-    def _require_sequence(self, prefixes: tuple[Modes, ...], target: float) -> None:
-        modes = np.array(prefixes).T
-        proof = self.sequences.get(tuple(map(tuple, modes.tolist())))
-        if proof is None:
-            raise Unproved(f"the certificate says nothing about the contact sequence {modes.tolist()}")
-        spans = self._spans(modes)
-        if any(low > high for low, high in spans):
-            return
-        self._require_box(modes, proof, spans, {}, target)
-
-    def _spans(self, modes: Array) -> list[tuple[float, float]]:
-        """Ranges of rho of the contacts of a sequence (T, C), in their order: finger by finger."""
-        b = self.bounds
-        return [(float(b.low[s, f].max()), float(b.high[s, f].min())) for s, _, f in intervals(modes)]
-
-    def _parts(self, proof: dict[str, Any], count: int) -> list[dict[str, Any]]:
-        if len(proof["parts"]) != count:
-            raise Unproved("a part of a split is missing")
-        return list(proof["parts"])
-
-    def _require_box(
-        self,
-        modes: Array,
-        proof: dict[str, Any],
-        spans: list[tuple[float, float]],
-        regions: Regions,
-        target: float,
-    ) -> None:
-        """Ranges `spans` of rho and regions of free fingers: split as the certificate says, or bounded by its multipliers."""
-        if "interval" in proof:
-            k, at = int(proof["interval"]), float(proof["at"])
-            low, high = spans[k]
-            if k < 0 or not low <= at <= high:
-                raise Unproved("a range is split outside of itself")
-            for part, span in zip(self._parts(proof, 2), ((low, at), (at, high)), strict=True):
-                self._require_box(modes, part, [*spans[:k], span, *spans[k + 1 :]], regions, target)
-        elif "parts" in proof:
-            place = int(proof["step"]), int(proof["finger"])
-            if min(place) < 0 or modes[place] != FREE:
-                raise Unproved("a region is asked of a finger that is on a facet")
-            for r, part in enumerate(self._parts(proof, self.bounds.regions)):
-                self._require_box(modes, part, spans, {**regions, place: r}, target)
-        elif not self._bounded(modes, proof, spans, regions, target):
-            raise Unproved(
-                f"its multipliers do not prove the bound for the contact sequence {modes.tolist()}"
-            )
-
-    def _bounded(
-        self,
-        modes: Array,
-        proof: dict[str, Any],
-        spans: list[tuple[float, float]],
-        regions: Regions,
-        target: float,
-    ) -> bool:
-        T, C = modes.shape
-        y = _numbers(proof["multipliers"], (T, 3))
-        a = _numbers(proof["accelerations"], (max(T - 2, 0), C, 2))
-        if self._dual(modes, y, np.zeros_like(a), spans, regions, free_of_cost=True) > 0:
-            return True
-        return self._dual(modes, y, a, spans, regions, free_of_cost=False) >= target
-
-    def _dual(
-        self,
-        modes: Array,
-        y: Array,
-        a: Array,
-        spans: list[tuple[float, float]],
-        regions: Regions,
-        free_of_cost: bool,
-    ) -> float:
-        """The dual value of a box, less what rounding may have made up."""
-        b, last = self.bounds, len(modes) - 1
-        value, size = self._motion(modes, a, regions)
-        for t in range(len(modes)):
-            needed, terms = b.balance(t, y[t])
-            value, size = value + needed, size + terms
-        pulls = [b.pulls(a[:, c]) for c in range(modes.shape[1])]
-        for (steps, c, f), span in zip(intervals(modes), spans, strict=True):
-            ends = []
-            for rho in span:
-                moved = [float(pulls[c][t] @ b.place(t, f, rho)) for t in steps]
-                gains = [b.gain(t, f, rho, y[t], free_of_cost) for t in steps if t == last or t + 1 in steps]
-                ends.append(sum(moved) - sum(gains))
-                size += sum(map(abs, moved)) + sum(map(abs, gains))
-            value += min(ends)
-        return value - ROUNDING * size
-
-    def _motion(self, modes: Array, a: Array, regions: Regions) -> tuple[float, float]:
-        """-w sum |a|^2 and what free positions add: least over where they may be.  A finger that never touches costs nothing."""
-        b = self.bounds
-        value = -b.smooth_weight * float((a**2).sum())
-        size = abs(value)
-        for c in range(modes.shape[1]):
-            if (modes[:, c] == FREE).all():
-                continue
-            pull = b.pulls(a[:, c])
-            for t in np.flatnonzero(modes[:, c] == FREE):
-                corners = b.free_corners(int(t), regions.get((int(t), c)))
-                if len(corners) == 0:
-                    return np.inf, 0.0
-                terms = corners @ pull[t]
-                value, size = value + float(terms.min()), size + float(np.abs(terms).max())
-        return value, size
 
 
 def covers_the_outside(task: ContactTask) -> bool:
@@ -255,23 +146,3 @@ def covers_the_outside(task: ContactTask) -> bool:
     object_ = shapely.Polygon(vertices).buffer(clearance, join_style="mitre", mitre_limit=1e3)
     missing = shapely.Polygon(far).difference(object_).difference(regions)
     return bool(missing.area <= 1e-9 * task.body.size**2)
-
-
-def intervals(modes: Array) -> list[Interval]:
-    """Contacts of a sequence (T, C), finger by finger."""
-    found: list[Interval] = []
-    for c in range(modes.shape[1]):
-        start = 0
-        for f, run in itertools.groupby(modes[:, c].tolist()):
-            steps = range(start, start := start + len(list(run)))
-            if f != FREE:
-                found.append((steps, c, int(f)))
-    return found
-
-
-def _numbers(packed: Any, shape: tuple[int, ...]) -> Array:
-    """Little-endian float64 in base64, all finite and of a size that can be squared."""
-    values = np.frombuffer(base64.b64decode(packed, validate=True), dtype="<f8").reshape(shape)
-    if not (np.abs(values) <= LARGEST).all():
-        raise Unproved("the certificate holds numbers that are not finite, or huge")
-    return values
