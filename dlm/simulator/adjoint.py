@@ -76,7 +76,7 @@ def adjoint_step(
 ) -> None:
     """Turn the adjoints `bar` of the state after the step into those before it, in place; add to the commands' (2, C, 2)."""
     n, _ = solve_step(world, state, commands, work)
-    early = 0.5 * world.h if coasts(n, state, work) else 0.0
+    early = 0.5 * world.h if coasts(n, world, state, work) else 0.0
     if world.support > 0:
         _linearise_support(n, world, state, work)
     end, ends = bar.velocity + (world.h - early) * bar.pose, world.h * bar.fingers

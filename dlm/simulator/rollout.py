@@ -174,7 +174,7 @@ def move(world: World, motion: Motion, i: int, near: np.ndarray, work: Work) -> 
     contacts = work.problem.contacts
     before = State(poses[i], velocities[i], fingers[i])
     n, exact = solve_step(world, before, commands[i : i + 2], work)
-    coasting, held = coasts(n, before, work), 0
+    coasting, held = coasts(n, world, before, work), 0
     for k in range(n):
         held += ROWS[contacts[k].state]
         if contacts[k].finger >= 0:

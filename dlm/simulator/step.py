@@ -85,8 +85,10 @@ def solve_step(world: World, state: State, commands: np.ndarray, work: Work) -> 
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def coasts(n: int, before: State, work: Work) -> bool:
-    """Whether no contact acts in the step that was solved, nor would if the mean of both velocities moved the object."""
+def coasts(n: int, world: World, before: State, work: Work) -> bool:
+    """Whether gravity alone acts in the step that was solved, and would if the mean of both velocities moved the object."""
+    if world.support > 0:
+        return False
     contacts, rows, _, _ = work.problem
     v, after = before.velocity, work.velocity
     for i in range(n):

@@ -182,6 +182,8 @@ def _minkowski(a: Array, b: Array) -> Array:
 
 def _separating(free: Array, piece: Array) -> Array:
     """Unit normal u with the widest gap min u . free - max u . piece; an edge normal of one of the two polygons."""
+    if not _has_area(free):
+        return half_planes(piece)[0][0]  # no finger can be there: any direction will do
     candidates = np.concatenate([-half_planes(cleaned(free))[0], half_planes(piece)[0]])
     gaps = (free @ candidates.T).min(axis=0) - (piece @ candidates.T).max(axis=0)
     return candidates[int(gaps.argmax())]

@@ -1,4 +1,4 @@
-"""Contact certificates read as docs/contact-solver.md describes them, in plain numpy: the bound that they prove."""
+"""Contact certificates read as docs/theory/contact-certificate.md describes them, in plain numpy: the bound that they prove."""
 
 import base64
 import itertools

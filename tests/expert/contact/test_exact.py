@@ -238,8 +238,9 @@ def test_what_has_a_plan_by_construction_is_never_infeasible(seed: int) -> None:
 
 @pytest.mark.slow
 def test_none_of_five_hundred_feasible_tasks_is_called_infeasible() -> None:
-    lost = [seed for seed in range(500) if not solve(feasible_task(seed), gap=0.05).found]
-    assert lost == []
+    status = [solve(feasible_task(seed), gap=0.05, time_limit=10.0).status for seed in range(500)]
+    assert status.count("infeasible") == 0
+    assert status.count("time_limit") <= 2, "a search may spend its budget, but rarely"
 
 
 def test_a_margin_that_is_rewarded_a_lot_stays_well_conditioned() -> None:
