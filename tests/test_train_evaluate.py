@@ -178,7 +178,13 @@ def test_the_report_fits_desks_and_telephones(results: Path, tmp_path: Path, wid
 @pytest.mark.slow
 def test_the_command_that_training_names_judges_the_structured_model_too(workplace: Path) -> None:
     model = ["experiment=smoke", "model=structured", "stage=structured/mdr", "output=runs/structured"]
-    schedule = {"iterations": 60, "learning_rate": 3e-3, "batch_size": 4, "log_every": 60, "save_every": 60}
+    schedule = {
+        "iterations": 150,
+        "learning_rate": 3e-3,
+        "batch_size": 4,
+        "log_every": 150,
+        "save_every": 150,
+    }
     said = finish(
         start("train.py", *model, *(f"schedule.{k}={v}" for k, v in schedule.items()), cwd=workplace)
     )

@@ -68,22 +68,22 @@ def test_gradients_agree_with_finite_differences(backend: str, generic: Tensor) 
     noise = torch.Generator().manual_seed(1)
     directions = [torch.randn(rows.shape, generator=noise, dtype=rows.dtype) for _ in range(8)]
     exact = InverseDynamics(backend="batched")
-    h = 1e-6
-    with torch.no_grad():
-        differences = torch.stack(
-            [
-                (
-                    score(exact(LAYOUT.unflatten(generic + h * d)))
-                    - score(exact(LAYOUT.unflatten(generic - h * d)))
-                )
-                / (2 * h)
-                for d in directions
-            ]
-        )
     slopes = torch.stack([(rows.grad * d).sum((1, 2)) for d in directions])
-    cosine = torch.cosine_similarity(slopes, differences, dim=0)
-    assert cosine.min() > 0.999, cosine
-    torch.testing.assert_close(slopes.norm(dim=0), differences.norm(dim=0), rtol=1e-2, atol=0)
+    agree = torch.zeros(len(generic), dtype=torch.bool)
+    for h in (
+        1e-5,
+        1e-6,
+        1e-7,
+    ):  # a large step crosses corners of the optimum, a small one drowns in the solver's noise
+        with torch.no_grad():
+            ends = [
+                [score(exact(LAYOUT.unflatten(generic + s * h * d))) for s in (1, -1)] for d in directions
+            ]
+        differences = torch.stack([(ahead - behind) / (2 * h) for ahead, behind in ends])
+        cosine = torch.cosine_similarity(slopes, differences, dim=0)
+        ratio = slopes.norm(dim=0) / differences.norm(dim=0)
+        agree |= (cosine > 0.999) & ((ratio - 1).abs() < 1e-2)
+    assert agree.all(), agree
 
 
 def test_positions_feel_the_cones_through_the_first_order_torque_alone(generic: Tensor) -> None:
