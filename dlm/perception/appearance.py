@@ -19,6 +19,8 @@ FAINTEST = 12.0
 """Colours differ from this distance on [grey levels]."""
 LEAST_MOVING = 0.03
 """Of a thing that moves, so much changes colour at least."""
+THING = 6
+"""Pixels that make a thing."""
 FEWEST = 8
 """Pixels that tell the object's colour."""
 CROSS = np.array([[[0, 1, 0], [1, 1, 1], [0, 1, 0]]])
@@ -59,8 +61,8 @@ def separate(video: Frames, camera: Camera, floor: bool, blur: float = 0.0, code
     contrast = light * length**0.5
     precision = 1 / ((noise / contrast) ** 2 + MODEL_ERROR**2)
     odd = off > max(6 * noise, FOREIGN)
-    # What moves along, as fingers do, mixes its colour into the outline all the way.
-    odd |= ndimage.binary_dilation(odd & ~odd.all(axis=0), CROSS, iterations=2)
+    # What moves along, as fingers do, mixes its colour into the outline all the way; compression leaves odd pixels, but no things.
+    odd |= ndimage.binary_dilation(_things(odd & ~odd.all(axis=0)), CROSS, iterations=2)
     foreign = odd | _half_covered_areas(share, noise / contrast)
     foreign |= _standing(np.where(foreign, 0.0, share))
     return Appearance(share, np.broadcast_to(precision, share.shape), foreign, noise, contrast)
@@ -75,6 +77,12 @@ def _half_covered_areas(share: Array, deviation: Array) -> NDArrayBool:
     flat = highest - lowest < 0.1 + 5 * deviation
     odd = flat & (np.abs(mean - np.clip(np.rint(mean), 0, 1)) > 0.12 + deviation)
     return np.asarray(ndimage.binary_dilation(odd, np.ones((1, 3, 3))))
+
+
+def _things(masks: NDArrayBool) -> NDArrayBool:
+    """The connected pieces of each mask (T, h, w) that are as large as THING."""
+    pieces, _ = ndimage.label(masks, np.pad(np.ones((1, 3, 3)), ((1, 1), (0, 0), (0, 0))))
+    return np.asarray((np.bincount(pieces[masks], minlength=pieces.max() + 1) >= THING)[pieces] & masks)
 
 
 def _standing(share: Array) -> NDArrayBool:

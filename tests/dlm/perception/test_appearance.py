@@ -4,7 +4,7 @@ import pytest
 from datasets.disturb import random_palette
 from datasets.render import render
 from dlm.perception import perceive
-from dlm.perception.appearance import _standing
+from dlm.perception.appearance import _standing, _things
 from tests.support.videos import errors, task_of
 
 
@@ -37,3 +37,14 @@ def test_what_stands_still_is_told_from_what_moves() -> None:
 def test_where_nothing_moves_everything_may_be_the_object() -> None:
     share = np.repeat(moving_box()[:1], 3, axis=0)
     assert not _standing(share).any()
+
+
+def test_a_few_odd_pixels_are_no_thing() -> None:
+    masks = np.zeros((2, 12, 12), dtype=bool)
+    masks[0, 2, 2:7] = True  # five
+    masks[0, 6:9, 6:8] = True  # six
+    masks[1, 2:4, 2:5] = True  # six, next to the five of the frame before
+    kept = _things(masks)
+    assert not kept[0, 2].any()
+    assert kept[0, 6:9, 6:8].all()
+    assert kept[1].sum() == 6
