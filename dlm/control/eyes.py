@@ -7,7 +7,7 @@ import numpy as np
 
 from dlm.control import pusht
 from dlm.control.look import Frame, Stage, find_agent, find_block, follow_block, frame_of, stage
-from dlm.control.picture import empty_scene
+from dlm.control.picture import empty_scene, painted
 from expert.errors import InvalidProblem
 from expert.geometry.pose import Array
 from expert.pushing.drive import Drive
@@ -39,6 +39,7 @@ class Belief:
 class Eyes(Protocol):
     """Turns observations into beliefs; `act` tells it the command that follows, `believe` what the block is like."""
 
+    def rehearse(self) -> None: ...
     def reset(self, model: ImpulseModel) -> None: ...
     def believe(self, model: ImpulseModel) -> None: ...
     def see(self, observation: object) -> Belief: ...
@@ -52,6 +53,9 @@ class StateEyes:
     drive: Drive = field(default_factory=Drive)
     belief: Belief | None = None
     command: Array | None = None
+
+    def rehearse(self) -> None:
+        """There is nothing to load."""
 
     def reset(self, model: ImpulseModel) -> None:
         """Forget the episode."""
@@ -102,6 +106,16 @@ class PixelEyes:
         """Forget the episode."""
         self.model = model
         self.belief, self.commands, self.seen, self.usual = None, [], [], 0.0
+
+    def rehearse(self) -> None:
+        """Load compiled code with pictures of one's own, so that the first look takes no longer than others."""
+        pose, agent = self.goal.pose, np.array([60.0, 60.0])
+        picture = painted(self.model.edges, self.stage.empty, pose, self.model.radius, agent)
+        self.reset(self.model)
+        for _ in range(2):
+            self.see(picture)
+            self.act(agent)
+        self.reset(self.model)
 
     def believe(self, model: ImpulseModel) -> None:
         """Predict with another model from now on."""

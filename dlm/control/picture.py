@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from expert.geometry.pose import Array
 from expert.pushing.outline import Outline, clearance, distance_up_to
@@ -85,3 +86,15 @@ def paint_disc(radius: float, centre: Array, pixels: Pixels, width: float, out: 
             out[i, d] = pixels.empty[i, d]
             out[i, d] += ring * (RING[d] - out[i, d])
             out[i, d] += core * (CORE[d] - out[i, d])
+
+
+def painted(
+    edges: Outline, empty: Array, pose: Array, radius: float, agent: Array, width: float = 4.0
+) -> NDArray[np.uint8]:
+    """A frame (96, 96, 3) of the block at a pose (3,), over the agent's disc, over an empty scene (96, 96, 3)."""
+    scene = empty.reshape(-1, 3)
+    spots, out = places().reshape(-1, 2), np.empty_like(scene)
+    paint_disc(radius, agent, Pixels(spots, scene, scene), width, out)
+    below = out.copy()
+    paint(edges, len(edges.first) - 2, pose, Pixels(spots, below, below), width, out)
+    return np.rint(out).astype(np.uint8).reshape(empty.shape)

@@ -36,15 +36,16 @@ class PushPolicy:
 
     @classmethod
     def for_pusht(cls, observation: str = "pixels") -> "PushPolicy":
-        """For gym-pusht with observations of the type `pixels` or `state`.  Raises InvalidProblem."""
+        """For gym-pusht with observations of the type `pixels` or `state`, rehearsed.  Raises InvalidProblem."""
         require(observation in ("pixels", "state"), "observation", "pixels or state", observation)
         settings = pusht.PIXELS if observation == "pixels" else pusht.STATE
         planner = pusht.pusht_planner(settings.speed, settings.wobble)
-        learner = Learner(planner, settings.gate)
+        planner.rehearse()
         eyes: Eyes = StateEyes()
         if observation == "pixels":
             eyes = PixelEyes(planner.model, planner.goal)
-        return cls(learner, eyes, settings.tolerance)
+        eyes.rehearse()
+        return cls(Learner(planner, settings.gate), eyes, settings.tolerance)
 
     @property
     def planner(self) -> Planner:

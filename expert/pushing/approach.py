@@ -2,13 +2,15 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from expert.geometry.pose import Array, rotation, to_body, to_world
-from expert.pushing.drive import Drive, substep_map
+from expert.pushing.drive import Drive, gains, substep_map
 from expert.pushing.outline import Outline, clearance, touch
 from expert.pushing.roads import Roads, bends
 from expert.pushing.search import inside
@@ -17,6 +19,8 @@ BULGES = (0.0, 0.5, 1.2)
 """Bends are tried at their corners, and farther out by these multiples of the radius."""
 LONGEST = 9
 """Steps of a travel."""
+MOST_POINTS = 4
+"""On ways that are prepared for; longer ones take a moment."""
 SLACK = 0.02
 """A finger that is nearer than its gap may come nearer yet by this fraction of its radius: places are known no better."""
 
@@ -34,39 +38,34 @@ class Travel:
     gap: float
     walls: Array
 
-    def commands(self, pose: Array, end: Array, position: Array, velocity: Array) -> Array | None:
-        """Fewest commands (n, 2) to rest at `end` (2,), beside the object at a pose (3,); None: none found."""
+    def commands(
+        self, pose: Array, end: Array, position: Array, velocity: Array, longest: int = LONGEST
+    ) -> Array | None:
+        """Fewest commands (n, 2), at most `longest`, to rest at `end` (2,), beside the object at a pose (3,).
+
+        None: none found.  The finger keeps its gap to the object at rest, or, as long as it is nearer, moves away from it.
+        """
         start, goal = to_body(pose, np.stack([position, end]))
         station = int(((self.ways.stations - goal) ** 2).sum(1).argmin())
         corners = [to_world(pose, corner[None])[0] for corner in bends(self.ways, start, station)]
         off = [] if (out := self.retreat(pose, position, 2 * self.gap)) is None else [out]
-        for steps in range(2, LONGEST + 1):
-            for via in _vias(steps, corners, off, pose[:2], self.drive.radius):
-                commands = self.drive.commands(steps, position, velocity, end, via)
-                if self.is_clear(pose, position, velocity, commands):
-                    return commands
+        through = list(_through(corners, off, pose[:2], self.drive.radius))
+        need, slack = self.drive.radius + self.gap, SLACK * self.drive.radius
+        gate = Gate(self.edges, pose, need, slack, self.walls, *substep_map(self.drive), self.drive.substeps)
+        for steps in range(2, longest + 1):
+            for points in through:
+                if len(points) <= steps - 2:
+                    known = np.stack([position, velocity, end, *points])
+                    ways = _timings(self.drive, steps, len(points)) @ known
+                    if (clear := _first_clear(gate, position, velocity, ways)) >= 0:
+                        return np.asarray(ways[clear])
         return None
 
-    def is_clear(self, pose: Array, position: Array, velocity: Array, commands: Array) -> bool:
-        """Whether the finger keeps its gap to the object at rest, or, as long as it is nearer, moves away from it."""
-        if not all(inside(self.walls, x, y, 1e-9) for x, y in commands):
-            return False
-        a, b = substep_map(self.drive)
-        need = self.drive.radius + self.gap
-        return bool(
-            _clear(
-                self.edges,
-                pose,
-                position,
-                velocity,
-                commands,
-                a,
-                b,
-                self.drive.substeps,
-                need,
-                SLACK * self.drive.radius,
-            )
-        )
+    def prepare(self) -> None:
+        """Work out beforehand how the drive passes points, for ways with up to MOST_POINTS of them."""
+        for points in range(MOST_POINTS + 1):
+            for steps in range(2 + points, LONGEST + 1):
+                _timings(self.drive, steps, points)
 
     def retreat(self, pose: Array, position: Array, gap: float) -> Array | None:
         """The point (2,) straight off the object with the given gap; None where the finger has it already."""
@@ -78,45 +77,67 @@ class Travel:
         return None if depth <= 0 else position - depth * rotation(pose[2]) @ [near.nx, near.ny]
 
 
-def _vias(
-    steps: int, corners: list[Array], off: list[Array], centre: Array, radius: float
-) -> Iterator[dict[int, Array]]:
-    """Points that the finger shall pass, by the step after which it does."""
+def _through(corners: list[Array], off: list[Array], centre: Array, radius: float) -> Iterator[list[Array]]:
+    """Points that the finger shall pass, one after the other."""
     for bulge in BULGES if corners else BULGES[:1]:
         outer = [p + bulge * radius * (p - centre) / np.linalg.norm(p - centre) for p in corners]
-        for points in [outer, off + outer] if off else [outer]:
-            if len(points) <= steps - 2:
-                for at in combinations(range(1, steps), len(points)):
-                    yield dict(zip(at, points, strict=True))
+        yield outer
+        if off:
+            yield off + outer
+
+
+@lru_cache
+def _timings(drive: Drive, steps: int, points: int) -> Array:
+    """Gains (ways, steps, 3 + points) of all choices of the steps after which the points are passed."""
+    return np.array([gains(drive, steps, at) for at in combinations(range(1, steps), points)])
+
+
+class Gate(NamedTuple):
+    """What a way is checked against: edges of the object at a pose (3,), distance that the finger's centre needs, walls.
+
+    a (2, 2) and b (2,): the drive's substep.
+    """
+
+    edges: Outline
+    pose: Array
+    need: float
+    slack: float
+    walls: Array
+    a: Array
+    b: Array
+    substeps: int
 
 
 @njit(cache=True, error_model="numpy")
-def _clear(
-    edges: Outline,
-    pose: Array,
-    position: Array,
-    velocity: Array,
-    commands: Array,
-    a: Array,
-    b: Array,
-    substeps: int,
-    need: float,
-    slack: float,
-) -> bool:
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    p, v = position.copy(), velocity.copy()
-    reached = min(need, clearance(edges, *_body(p, pose, c, s)))
+def _first_clear(gate: Gate, position: Array, velocity: Array, ways: Array) -> int:
+    """Which of the ways (N, steps, 2) is the first that is clear; -1: none."""
+    for k in range(len(ways)):
+        if _clear(gate, position, velocity, ways[k]):
+            return k
+    return -1
+
+
+@njit(cache=True, error_model="numpy")
+def _clear(gate: Gate, position: Array, velocity: Array, commands: Array) -> bool:
+    """Whether the finger keeps the distance that it needs once it has it, gives little of it up before, and keeps to the walls."""
     for k in range(len(commands)):
-        for _ in range(substeps):
+        if not inside(gate.walls, commands[k, 0], commands[k, 1], 1e-9):
+            return False
+    c, s = np.cos(gate.pose[2]), np.sin(gate.pose[2])
+    p, v = position.copy(), velocity.copy()
+    a, b = gate.a, gate.b
+    reached = min(gate.need, clearance(gate.edges, *_body(p, gate.pose, c, s)))
+    for k in range(len(commands)):
+        for _ in range(gate.substeps):
             for d in range(2):
                 p[d], v[d] = (
                     a[0, 0] * p[d] + a[0, 1] * v[d] + b[0] * commands[k, d],
                     a[1, 0] * p[d] + a[1, 1] * v[d] + b[1] * commands[k, d],
                 )
-            gap = clearance(edges, *_body(p, pose, c, s))
-            if gap < (need if reached >= need else reached - slack):
+            gap = clearance(gate.edges, *_body(p, gate.pose, c, s))
+            if gap < (gate.need if reached >= gate.need else reached - gate.slack):
                 return False
-            reached = max(reached, min(gap, need))
+            reached = max(reached, min(gap, gate.need))
     return True
 
 

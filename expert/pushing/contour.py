@@ -1,6 +1,7 @@
 """Where the finger may stand next to the object: the closed curve of disc centres at a fixed gap from it."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -32,14 +33,21 @@ class Contour:
         Near the corners of the curve, normals turn steadily from those of one chord to those of the next.
         """
         s = np.asarray(s, dtype=float) % self.length
-        closed = np.concatenate([self.corners, self.corners[:1]])
+        closed, knots, inward = self._curve
         points = np.stack([np.interp(s, self.lengths, closed[:, k]) for k in (0, 1)], -1)
+        normal = np.stack([np.interp(s, knots, inward[:, k]) for k in (0, 1)], -1)
+        return points, normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+    @cached_property
+    def _curve(self) -> tuple[Array, Array, Array]:
+        """The closed polyline (N + 1, 2); arc lengths (2 N + 2,) with the inward normals there (2 N + 2, 2)."""
+        closed = np.concatenate([self.corners, self.corners[:1]])
         chords = np.diff(self.lengths)
         inset = np.minimum(chords / 2, np.median(chords) / 2)
         knots = np.stack([self.lengths[:-1] + inset, self.lengths[1:] - inset], -1).ravel()
         inward = np.repeat(facet_frames(self.corners)[0], 2, axis=0)
-        normal = np.stack([np.interp(s, knots, inward[:, k], period=self.length) for k in (0, 1)], -1)
-        return points, normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+        around = np.concatenate([knots[-1:] - self.length, knots, knots[:1] + self.length])
+        return closed, around, np.concatenate([inward[-1:], inward, inward[:1]])
 
 
 def contour(shape: Shape, origin: Array, offset: float) -> Contour:

@@ -4,7 +4,7 @@ The drive is linear and the same along x and y: position and velocity after a co
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -61,7 +61,7 @@ def step_map(drive: Drive) -> tuple[Array, Array]:
     return a, np.array([1 - a[0, 0], -a[1, 0]])
 
 
-@lru_cache
+@cache
 def gains(drive: Drive, steps: int, via: tuple[int, ...]) -> Array:
     """Matrix (steps, 3 + len(via)): commands = matrix @ (p, v, end, via points), of least summed squared acceleration.
 
@@ -69,21 +69,29 @@ def gains(drive: Drive, steps: int, via: tuple[int, ...]) -> Array:
     """
     require(steps >= 2 + len(via), "steps", "at least 2, and one more for each point on the way", steps)
     require(all(0 < j < steps for j in via), "via", f"steps from 1 to {steps - 1}", via)
-    a, b = substep_map(drive)
-    response = np.concatenate([np.eye(2), np.zeros((2, steps))], axis=1)  # of (p, v) to (p0, v0, u)
-    accelerations, at = [], {}
-    for k in range(steps * drive.substeps):
-        moved = a @ response
-        moved[:, 2 + k // drive.substeps] += b
-        accelerations.append(moved[1] - response[1])
-        response = moved
-        at[(k + 1) / drive.substeps] = response
-    rows = np.stack([at[steps][0], at[steps][1], *(at[j][0] for j in via)])
+    accelerations, states = _responses(drive, steps)
+    rows = np.concatenate([states[-1], states[[j - 1 for j in via], 0]])
     wanted = np.zeros((len(rows), 3 + len(via)))
     wanted[0, 2] = 1
     wanted[2:, 3:] = np.eye(len(via))
     wanted[:, :2] -= rows[:, :2]
-    return _least_squares(np.array(accelerations), rows[:, 2:], wanted)
+    return _least_squares(accelerations, rows[:, 2:], wanted)
+
+
+@lru_cache
+def _responses(drive: Drive, steps: int) -> tuple[Array, Array]:
+    """Answers to (p0, v0, u): accelerations (substeps, 2 + steps), and (p, v) after each step (steps, 2, 2 + steps)."""
+    a, b = substep_map(drive)
+    response = np.concatenate([np.eye(2), np.zeros((2, steps))], axis=1)
+    accelerations, states = [], []
+    for k in range(steps):
+        for _ in range(drive.substeps):
+            moved = a @ response
+            moved[:, 2 + k] += b
+            accelerations.append(moved[1] - response[1])
+            response = moved
+        states.append(response)
+    return np.array(accelerations), np.array(states)
 
 
 def _least_squares(effort: Array, rows: Array, wanted: Array) -> Array:

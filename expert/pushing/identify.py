@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from expert.geometry.pose import Array, wrapped
-from expert.pushing.impulse_model import ImpulseModel
-from expert.pushing.impulses import ANGLE, Block, X, run
+from expert.pushing.impulse_model import ImpulseModel, shifted
+from expert.pushing.impulses import ANGLE, Block, Law, X, trace
 
 LEVER = 45.0
 """Length at which an angle's error counts like a position's."""
@@ -18,6 +18,8 @@ WIDTHS = np.array([20.0, 20.0, 0.5, 30.0])
 MOST_SLIDING = 60.0
 NOISE = 0.5
 """Of seen poses [length]."""
+STUCK = 1e4
+"""No step is found where the damping exceeds this."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +35,14 @@ class Seen:
 
 def deviation(model: ImpulseModel, push: Seen) -> Array:
     """Seen minus predicted poses (n, 3); the angle in lengths, at a lever of LEVER."""
+    return _deviation(model.law, model.offset, model.drive.substeps, push)
+
+
+def _deviation(law: Law, offset: Array, substeps: int, push: Seen) -> Array:
+    """By a law about the centre of gravity at `offset` (2,) in the frame of the poses."""
     state = np.zeros(13)
-    state[:2], state[2:4], state[X : ANGLE + 1] = push.position, push.velocity, model.centre_pose(push.pose)
-    rows = np.empty_like(push.poses)
-    for k, command in enumerate(push.commands):
-        run(model.law, state, command[None], model.drive.substeps)
-        rows[k] = push.poses[k] - model.frame_pose(state[X : ANGLE + 1])
+    state[:2], state[2:4], state[X : ANGLE + 1] = push.position, push.velocity, shifted(push.pose, offset)
+    rows = push.poses - shifted(trace(law, state, push.commands, substeps), -offset)
     rows[:, 2] = LEVER * wrapped(rows[:, 2])
     return rows
 
@@ -66,6 +70,8 @@ def identified(model: ImpulseModel, pushes: Sequence[Seen], first: Block, rounds
             at, residual, damping = trial, found, damping / 4
         else:
             damping *= 8
+        if damping > STUCK:
+            break
     return replace(model, block=_block(first, at))
 
 
@@ -80,7 +86,10 @@ def _block(like: Block, numbers: Array) -> Block:
 
 def _residual(model: ImpulseModel, numbers: Array, pushes: Sequence[Seen], guess: Array) -> Array:
     """Deviations in units of the noise, large ones tamed, and distance from the first guess in units of its width."""
-    tried = replace(model, block=_block(model.block, numbers))
-    rows = np.concatenate([deviation(tried, push).ravel() for push in pushes]) / NOISE
+    block = _block(model.block, numbers)
+    edges = model.law.edges._replace(starts=model.law.edges.starts + model.block.centre - block.centre)
+    law = model.law._replace(edges=edges, gyration=block.gyration, kept=block.kept)
+    offset, substeps = block.centre - model.origin, model.drive.substeps
+    rows = np.concatenate([_deviation(law, offset, substeps, push).ravel() for push in pushes]) / NOISE
     tamed = np.sign(rows) * np.minimum(np.abs(rows), np.sqrt(np.abs(rows) * 30))
     return np.concatenate([tamed, (numbers - guess) / WIDTHS])

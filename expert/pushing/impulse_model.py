@@ -72,11 +72,11 @@ class ImpulseModel:
 
     def centre_pose(self, poses: Array) -> Array:
         """Poses (..., 3) of the centre of gravity, from those of the moving frame."""
-        return _shifted(poses, self.offset)
+        return shifted(poses, self.offset)
 
     def frame_pose(self, poses: Array) -> Array:
         """Poses (..., 3) of the moving frame, from those of the centre of gravity."""
-        return _shifted(poses, -self.offset)
+        return shifted(poses, -self.offset)
 
     def steps(self, lengths: Array) -> IntArray:
         """Control steps of pushes of given lengths: one to start and stop, one for each `speed` of way, and the wait."""
@@ -94,7 +94,8 @@ class ImpulseModel:
     def outcomes(self, starts: Array, directions: Array, lengths: Array) -> tuple[Array, Array]:
         """Pose changes (N, 3) of the block, and where the finger ends in its new frame (N, 2)."""
         steps = self.steps(lengths)
-        weights = np.zeros((steps.max() + 1, steps.max()))
+        longest = steps.max(initial=0)
+        weights = np.zeros((longest + 1, longest))
         for n in np.unique(steps):
             weights[n, :n] = self.weights(int(n))
         moves = np.ascontiguousarray(lengths[:, None] * directions)
@@ -105,7 +106,7 @@ class ImpulseModel:
         return self.frame_pose(places), fingers + self.offset
 
 
-def _shifted(poses: Array, offset: Array) -> Array:
+def shifted(poses: Array, offset: Array) -> Array:
     """Poses (..., 3) of a frame moved by an offset (2,) in its own axes."""
     moved = poses[..., :2] + offset @ np.swapaxes(rotation(poses[..., 2]), -1, -2)
     return np.concatenate([moved, poses[..., 2:]], axis=-1)

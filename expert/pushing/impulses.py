@@ -129,3 +129,13 @@ def run(law: Law, s: Array, commands: Array, substeps: int) -> None:
     for k in range(len(commands)):
         for _ in range(substeps):
             substep(law, s, commands[k, 0], commands[k, 1])
+
+
+@njit(cache=True, error_model="numpy")
+def trace(law: Law, s: Array, commands: Array, substeps: int) -> Array:
+    """Poses (n, 3) of the block's centre after each command (n, 2); the state (13,) is advanced in place."""
+    poses = np.empty((len(commands), 3))
+    for k in range(len(commands)):
+        run(law, s, commands[k : k + 1], substeps)
+        poses[k] = s[X : ANGLE + 1]
+    return poses

@@ -6,8 +6,8 @@ from functools import cached_property
 import numpy as np
 
 from expert.geometry.pose import Array, rotation, to_world
-from expert.pushing.approach import Travel
-from expert.pushing.goal import Goal
+from expert.pushing.approach import LONGEST, Travel
+from expert.pushing.goal import Goal, centroids
 from expert.pushing.impulse_model import ImpulseModel
 from expert.pushing.outline import clearance
 from expert.pushing.refine import composed, refine
@@ -92,7 +92,16 @@ class Planner:
         table = self.table
         starts, directions, lengths = straight(table.curve, table.parameters)
         leads = starts + self.model.leads(lengths)[:, None] * directions
-        return Moves(table.ways, table.first, table.shifts, table.fingers, leads, table.steps)
+        return Moves(
+            table.ways,
+            table.first,
+            table.shifts,
+            table.fingers,
+            leads,
+            table.steps,
+            middles=centroids(table.shifts, self.goal.centroid),
+            turns=np.stack([np.cos(table.shifts[:, 2]), np.sin(table.shifts[:, 2])], -1),
+        )
 
     @cached_property
     def task(self) -> Task:
@@ -108,6 +117,14 @@ class Planner:
         return Travel(
             model.drive, model.edges, self.table.ways, self.effort.clearance, self.workspace.finger_walls
         )
+
+    def rehearse(self) -> None:
+        """Load compiled code and work out what plans have in common, so that the first plan takes no longer than others."""
+        self.travel.prepare()
+        pose, still = self.goal.pose, np.zeros(2)
+        beside, within = to_world(pose, np.stack([self.table.ways.stations[0], self.goal.centroid]))
+        for position in (beside, within):
+            self.plan(pose, position, still, tolerance=1.0)
 
     def plan(
         self, pose: Array, position: Array, velocity: Array, tolerance: float, weight: float = 1.0
@@ -195,19 +212,28 @@ class Planner:
             if (key := candidate.first.tobytes()) in seen:
                 continue
             seen.add(key)
-            plan = self._with_way(candidate, pose, position, velocity, prices)
-            if plan is not None and (
-                best is None or (not plan.reaches, plan.steps) < (not best.reaches, best.steps)
-            ):
+            if plan := self._with_way(candidate, pose, position, velocity, prices, best):
                 best = plan
         return best
 
     def _with_way(
-        self, candidate: _Candidate, pose: Array, position: Array, velocity: Array, prices: Prices
+        self,
+        candidate: _Candidate,
+        pose: Array,
+        position: Array,
+        velocity: Array,
+        prices: Prices,
+        best: Plan | None,
     ) -> Plan | None:
+        """The candidate's plan; None: no clear way that makes it better than the best one so far."""
         starts, directions, lengths = straight(self.table.curve, candidate.first[None])
         start = to_world(pose, starts)[0]
-        way = self.travel.commands(pose, start, position, velocity)
+        before_way = candidate.time - prices.travel - float(np.linalg.norm(start - position)) / prices.pace
+        longest = LONGEST
+        if best is not None and candidate.reaches <= best.reaches:
+            allowed = best.steps - before_way if candidate.reaches == best.reaches else 0.0
+            longest = min(LONGEST, int(np.ceil(allowed)) - 1)
+        way = self.travel.commands(pose, start, position, velocity, longest)
         if way is None:
             return None
         steps = int(self.model.steps(lengths)[0])
@@ -215,13 +241,12 @@ class Planner:
         if not all(inside(self.workspace.finger_walls, x, y, 1e-9) for x, y in push):
             return None
         expected = composed(pose[None], self.table.outcomes(candidate.first[None])[0])[0]
-        guessed = prices.travel + float(np.linalg.norm(start - position)) / prices.pace
         return Plan(
             np.concatenate([way, push]),
             len(way),
             expected,
             candidate.pushes,
-            candidate.time + len(way) - guessed,
+            before_way + len(way),
             candidate.error,
             candidate.reaches,
             candidate.first,

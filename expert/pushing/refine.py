@@ -31,22 +31,24 @@ def refine(
     shifts, fingers = table.outcomes(best)
     after = composed(before, shifts)
     residual = goal.residual(after)
-    damping = np.full(count, 1e-3)
+    damping, slopes = np.full(count, 1e-3), np.empty((count, 3, 3))
+    moved_on = np.ones(count, dtype=bool)  # the others' slopes are known
     for _ in range(rounds):
-        probes = (best[:, None] + nudges * np.eye(3)).reshape(-1, 3)
-        probed = composed(np.repeat(before, 3, axis=0), table.outcomes(probes)[0])
-        slopes = (goal.residual(probed).reshape(count, 3, 3) - residual[:, None]).swapaxes(1, 2)
+        probes = (best[moved_on, None] + nudges * np.eye(3)).reshape(-1, 3)
+        probed = composed(np.repeat(before[moved_on], 3, axis=0), table.outcomes(probes)[0])
+        changes = goal.residual(probed).reshape(-1, 3, 3) - residual[moved_on, None]
+        slopes[moved_on] = changes.swapaxes(1, 2)
         step = _damped(slopes, residual, damping) * nudges
         trial = best + np.clip(step, -REACH * scale, REACH * scale)
         trial[:, 2] = np.maximum(trial[:, 2], unit)
         shifts, ends = table.outcomes(trial)
         moved = composed(before, shifts)
         found = goal.residual(moved)
-        better = (found**2).sum(1) < (residual**2).sum(1)
-        best[better], after[better], fingers[better], residual[better] = (
-            x[better] for x in (trial, moved, ends, found)
+        moved_on = (found**2).sum(1) < (residual**2).sum(1)
+        best[moved_on], after[moved_on], fingers[moved_on], residual[moved_on] = (
+            x[moved_on] for x in (trial, moved, ends, found)
         )
-        damping = np.where(better, damping / 5, damping * 20)
+        damping = np.where(moved_on, damping / 5, damping * 20)
     return best, after, fingers, np.sqrt((residual**2).sum(1))
 
 

@@ -18,7 +18,10 @@ Nodes = np.ndarray[tuple[int], np.dtype[np.void]]
 
 
 class Moves(NamedTuple):
-    """A table for compiled code: see `Table`; leads (K, 2) are the farthest commands, in the frame before the push."""
+    """A table for compiled code: see `Table`; leads (K, 2) are the farthest commands, in the frame before the push.
+
+    middles (K, 2): the area's centroid after a push, in the frame before it; turns (K, 2): cosine and sine of its turn.
+    """
 
     ways: Roads
     first: IntArray
@@ -26,6 +29,8 @@ class Moves(NamedTuple):
     fingers: Array
     leads: Array
     steps: IntArray
+    middles: Array
+    turns: Array
 
 
 class Task(NamedTuple):
@@ -65,18 +70,32 @@ def poses_of(nodes: Nodes) -> Array:
 
 
 @njit(cache=True, error_model="numpy")
-def error_of(task: Task, x: float, y: float, angle: float) -> float:
-    """Root-mean-square displacement from the nearest goal."""
+def goals_from(task: Task, x: float, y: float, angle: float) -> Array:
+    """Goals (G, 4) in the frame of a pose: the area's centroid, cosine and sine of the turn."""
+    seen = np.empty((len(task.goals), 4))
     c, s = np.cos(angle), np.sin(angle)
-    mx, my = x + c * task.centroid[0] - s * task.centroid[1], y + s * task.centroid[0] + c * task.centroid[1]
-    least = np.inf
     for g in range(len(task.goals)):
         gx, gy, turn = task.goals[g]
         cg, sg = np.cos(turn), np.sin(turn)
-        dx = mx - gx - cg * task.centroid[0] + sg * task.centroid[1]
-        dy = my - gy - sg * task.centroid[0] - cg * task.centroid[1]
-        least = min(least, dx * dx + dy * dy + 2 * task.spread * (1 - np.cos(angle - turn)))
-    return np.sqrt(least)
+        dx = gx + cg * task.centroid[0] - sg * task.centroid[1] - x
+        dy = gy + sg * task.centroid[0] + cg * task.centroid[1] - y
+        seen[g, 0], seen[g, 1] = c * dx + s * dy, c * dy - s * dx
+        seen[g, 2], seen[g, 3] = cg * c + sg * s, sg * c - cg * s
+    return seen
+
+
+@njit(cache=True, error_model="numpy")
+def error_after(goals: Array, spread: float, mx: float, my: float, c: float, s: float) -> float:
+    """Root-mean-square displacement from the nearest goal after a push; goals (G, 4) as seen from before it.
+
+    (mx, my): the centroid after the push, in the same frame; c, s: cosine and sine of its turn.
+    """
+    least = np.inf
+    for g in range(len(goals)):
+        dx, dy = mx - goals[g, 0], my - goals[g, 1]
+        apart = 1 - c * goals[g, 2] - s * goals[g, 3]
+        least = min(least, dx * dx + dy * dy + 2 * spread * apart)
+    return np.sqrt(max(least, 0.0))
 
 
 @njit(cache=True, error_model="numpy")
@@ -152,12 +171,13 @@ def _expand(
     stations = len(moves.first) - 1
     ways, corner = np.empty(stations), np.empty(stations, np.int64)
     distances(moves.ways, node.finger_x, node.finger_y, ways, corner)
+    goals = goals_from(task, node.x, node.y, node.angle)
     for station in range(stations):
         sx, sy = moves.ways.stations[station]
         x, y = node.x + c * sx - s * sy, node.y + s * sx + c * sy
         if ways[station] < np.inf and inside(task.finger_walls, x, y, 0.0):
             start = node.time + prices.travel + ways[station] / prices.pace
-            _push(moves, task, prices, at, row, station, start, beam, ends, slack)
+            _push(moves, task, prices, at, row, goals, station, start, beam, ends, slack)
 
 
 @njit(cache=True, error_model="numpy")
@@ -167,6 +187,7 @@ def _push(
     prices: Prices,
     at: Nodes,
     row: int,
+    goals: Array,
     station: int,
     start: float,
     beam: Nodes,
@@ -181,19 +202,24 @@ def _push(
         time = start + moves.steps[entry]
         if time + prices.miss >= best[0].score and time >= ends[-1].score:
             continue
-        dx, dy, turn = moves.shifts[entry]
-        x, y, angle = node.x + c * dx - s * dy, node.y + s * dx + c * dy, node.angle + turn
-        error = error_of(task, x, y, angle)
+        error = error_after(
+            goals,
+            task.spread,
+            moves.middles[entry, 0],
+            moves.middles[entry, 1],
+            moves.turns[entry, 0],
+            moves.turns[entry, 1],
+        )
         soon = time + prices.error * error
         good, ending = soon + prices.miss < best[0].score, error <= prices.capture and soon < ends[-1].score
+        if not (good or ending):
+            continue
+        dx, dy, turn = moves.shifts[entry]
+        x, y, angle = node.x + c * dx - s * dy, node.y + s * dx + c * dy, node.angle + turn
         lead_x, lead_y = moves.leads[entry]
-        if (
-            (good or ending)
-            and inside(
-                task.finger_walls, node.x + c * lead_x - s * lead_y, node.y + s * lead_x + c * lead_y, 0.0
-            )
-            and fits(task, x, y, angle, slack)
-        ):
+        if inside(
+            task.finger_walls, node.x + c * lead_x - s * lead_y, node.y + s * lead_x + c * lead_y, 0.0
+        ) and fits(task, x, y, angle, slack):
             new = child[0]
             new.time, new.error, new.parent, new.entry = time, error, row, entry
             new.x, new.y, new.angle = x, y, angle
