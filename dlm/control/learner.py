@@ -8,7 +8,7 @@ from dlm.control.eyes import Belief
 from expert.geometry.pose import Array, to_world, wrapped
 from expert.pushing.identify import LEVER, Seen, identified, misfit
 from expert.pushing.planner import Planner
-from expert.pushing.search import inside
+from expert.pushing.room import inside
 from expert.pushing.table import push_table
 
 KEPT_PUSHES = 6
@@ -79,9 +79,9 @@ class Learner:
 
     def _is_free(self, push: Seen) -> bool:
         """Whether the block kept off the walls."""
-        task = self.first.task
+        room = self.first.task.room
         return all(
-            inside(task.walls, x, y, 0.0)
+            inside(room.walls, x, y, 0.0)
             for pose in [push.pose, *push.poses]
-            for x, y in to_world(pose, task.hull)
+            for x, y in to_world(pose, room.hull)
         )

@@ -37,7 +37,7 @@ class Settings(NamedTuple):
     wobble: float
 
 
-STATE, PIXELS = Settings(120.0, 1.8, 0.5, 0.0), Settings(100.0, 1.4, 6.0, 1.0)
+STATE, PIXELS = Settings(120.0, 1.8, 0.5, 0.0), Settings(100.0, 1.4, 8.0, 1.0)
 
 
 @lru_cache

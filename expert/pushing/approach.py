@@ -13,7 +13,7 @@ from expert.geometry.pose import Array, rotation, to_body, to_world
 from expert.pushing.drive import Drive, gains, substep_map
 from expert.pushing.outline import Outline, clearance, touch
 from expert.pushing.roads import Roads, bends
-from expert.pushing.search import inside
+from expert.pushing.room import inside
 
 BULGES = (0.0, 0.5, 1.2)
 """Bends are tried at their corners, and farther out by these multiples of the radius."""

@@ -7,11 +7,12 @@ import numpy as np
 
 from expert.geometry.pose import Array, rotation, to_world
 from expert.pushing.approach import LONGEST, Travel
-from expert.pushing.goal import Goal, centroids
+from expert.pushing.goal import Goal
 from expert.pushing.impulse_model import ImpulseModel
 from expert.pushing.outline import clearance
 from expert.pushing.refine import composed, refine
-from expert.pushing.search import Moves, Nodes, Prices, Task, beam_search, inside, poses_of
+from expert.pushing.room import EVERYWHERE, NOTHING, Room, inside
+from expert.pushing.search import Moves, Nodes, Prices, Task, beam_search, moves_of, poses_of
 from expert.pushing.table import Table, steadiness, straight
 
 TOUCHING = 0.85
@@ -89,26 +90,15 @@ class Planner:
     @cached_property
     def moves(self) -> Moves:
         """The table for compiled code."""
-        table = self.table
-        starts, directions, lengths = straight(table.curve, table.parameters)
-        leads = starts + self.model.leads(lengths)[:, None] * directions
-        return Moves(
-            table.ways,
-            table.first,
-            table.shifts,
-            table.fingers,
-            leads,
-            table.steps,
-            middles=centroids(table.shifts, self.goal.centroid),
-            turns=np.stack([np.cos(table.shifts[:, 2]), np.sin(table.shifts[:, 2])], -1),
-        )
+        return moves_of(self.table, self.goal.centroid)
 
     @cached_property
     def task(self) -> Task:
         """The goal and the walls for compiled code."""
-        hull = self.model.shape.vertices - self.model.origin
-        goal, space = self.goal, self.workspace
-        return Task(goal.poses, goal.centroid, goal.spread, hull, space.walls, space.finger_walls)
+        model, goal, space = self.model, self.goal, self.workspace
+        hull = model.shape.vertices - model.origin
+        room = Room(hull, space.walls, space.finger_walls, model.edges, NOTHING, 0.0, 0.0, EVERYWHERE)
+        return Task(goal.poses, goal.centroid, goal.spread, room)
 
     @cached_property
     def travel(self) -> Travel:

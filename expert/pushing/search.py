@@ -5,13 +5,15 @@ composition of poses.  Plans are compared that end at the goal, or have full dep
 its estimate alone.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from expert.geometry.pose import Array
+from expert.geometry.pose import Array, to_world
 from expert.pushing.roads import Roads, distances
+from expert.pushing.room import Room, depth_in_walls, finger_fits, fits, way_round
+from expert.pushing.table import Table, straight
 from expert.world.values import IntArray
 
 Nodes = np.ndarray[tuple[int], np.dtype[np.void]]
@@ -21,6 +23,7 @@ class Moves(NamedTuple):
     """A table for compiled code: see `Table`; leads (K, 2) are the farthest commands, in the frame before the push.
 
     middles (K, 2): the area's centroid after a push, in the frame before it; turns (K, 2): cosine and sine of its turn.
+    shorter (K,): first of the pushes, in a row, that this one begins with.
     """
 
     ways: Roads
@@ -28,27 +31,26 @@ class Moves(NamedTuple):
     shifts: Array
     fingers: Array
     leads: Array
-    steps: IntArray
+    steps: Array
     middles: Array
     turns: Array
+    shorter: IntArray
 
 
 class Task(NamedTuple):
-    """Goals (G, 3), the body's centroid (2,) and its spread; the hull (H, 2) stays inside half-planes (W, 3): n, n . p.
-
-    The finger's centre stays inside half-planes (F, 3), and so do its commands.
-    """
+    """Goals (G, 3), the centroid (2,) of the body's area and its spread, and where object and finger may be."""
 
     goals: Array
     centroid: Array
     spread: float
-    hull: Array
-    walls: Array
-    finger_walls: Array
+    room: Room
 
 
 class Prices(NamedTuple):
-    """Control steps for a miss, and for each length of the error; for start and stop; way per step; error worth mending."""
+    """Time for a miss, and for each length of the error; for start and stop; way per time; error worth mending.
+
+    Times are control steps, or seconds, as the table has it.
+    """
 
     miss: float
     error: float
@@ -62,6 +64,24 @@ NODE = np.dtype(
     + [(name, "i8") for name in ("parent", "entry")]
 )
 """A partial plan: its last push is `entry` of the table; parent is its row among the nodes, -1 for the root."""
+
+
+def moves_of(table: Table, centroid: Array) -> Moves:
+    """A table for compiled code; centroid (2,): of the object's area, in the moving frame."""
+    starts, directions, lengths = straight(table.curve, table.parameters)
+    begins = np.any(np.diff(table.parameters[:, :2], axis=0) != 0, axis=1)
+    turn = table.shifts[:, 2]
+    return Moves(
+        table.ways,
+        table.first,
+        table.shifts,
+        table.fingers,
+        starts + table.model.leads(lengths)[:, None] * directions,
+        table.steps.astype(float),
+        middles=to_world(table.shifts, centroid[None])[:, 0],
+        turns=np.stack([np.cos(turn), np.sin(turn)], -1),
+        shorter=np.concatenate([[0], np.flatnonzero(begins) + 1])[np.cumsum([0, *begins])],
+    )
 
 
 def poses_of(nodes: Nodes) -> Array:
@@ -99,39 +119,6 @@ def error_after(goals: Array, spread: float, mx: float, my: float, c: float, s: 
 
 
 @njit(cache=True, error_model="numpy")
-def inside(walls: Array, x: float, y: float, slack: float) -> bool:
-    """Whether a point keeps to the free side of all half-planes, but for `slack`."""
-    for w in range(len(walls)):  # noqa: SIM110  (compiled)
-        if walls[w, 0] * x + walls[w, 1] * y < walls[w, 2] - slack:
-            return False
-    return True
-
-
-@njit(cache=True, error_model="numpy")
-def fits(task: Task, x: float, y: float, angle: float, slack: float) -> bool:
-    """Whether the hull does, at a pose."""
-    c, s = np.cos(angle), np.sin(angle)
-    for k in range(len(task.hull)):
-        hx, hy = task.hull[k]
-        if not inside(task.walls, x + c * hx - s * hy, y + s * hx + c * hy, slack):
-            return False
-    return True
-
-
-@njit(cache=True, error_model="numpy")
-def depth_in_walls(task: Task, pose: Array) -> float:
-    """How far the hull reaches into walls at a pose; 0 outside of them."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    worst = 0.0
-    for k in range(len(task.hull)):
-        x = pose[0] + c * task.hull[k, 0] - s * task.hull[k, 1]
-        y = pose[1] + s * task.hull[k, 0] + c * task.hull[k, 1]
-        for w in range(len(task.walls)):
-            worst = max(worst, task.walls[w, 2] - task.walls[w, 0] * x - task.walls[w, 1] * y)
-    return worst
-
-
-@njit(cache=True, error_model="numpy")
 def beam_search(
     moves: Moves, task: Task, prices: Prices, pose: Array, finger: Array, depth: int, width: int, endings: int
 ) -> tuple[Nodes, Nodes]:
@@ -142,7 +129,7 @@ def beam_search(
     nodes, ends, root = _empty(depth * width), _empty(endings), _empty(1)
     root[0].x, root[0].y, root[0].angle = pose
     root[0].finger_x, root[0].finger_y = finger
-    slack = depth_in_walls(task, pose) + 1e-9
+    slack = depth_in_walls(task.room, pose) + 1e-9
     _expand(moves, task, prices, root, -1, nodes[:width], ends, slack)
     for level in range(1, depth):
         for k in range((level - 1) * width, level * width):
@@ -175,7 +162,7 @@ def _expand(
     for station in range(stations):
         sx, sy = moves.ways.stations[station]
         x, y = node.x + c * sx - s * sy, node.y + s * sx + c * sy
-        if ways[station] < np.inf and inside(task.finger_walls, x, y, 0.0):
+        if ways[station] < np.inf and finger_fits(task.room, x, y):
             start = node.time + prices.travel + ways[station] / prices.pace
             _push(moves, task, prices, at, row, goals, station, start, beam, ends, slack)
 
@@ -196,42 +183,63 @@ def _push(
 ) -> None:
     """Put the best push from a station into the beam, and what ends near the goal among the endings."""
     node, child, best = at[0], _empty(1), _empty(1)
-    c, s = np.cos(node.angle), np.sin(node.angle)
     best[0].score = beam[-1].score
     for entry in range(moves.first[station], moves.first[station + 1]):
         time = start + moves.steps[entry]
         if time + prices.miss >= best[0].score and time >= ends[-1].score:
             continue
-        error = error_after(
-            goals,
-            task.spread,
-            moves.middles[entry, 0],
-            moves.middles[entry, 1],
-            moves.turns[entry, 0],
-            moves.turns[entry, 1],
-        )
+        (mx, my), (ct, st) = moves.middles[entry], moves.turns[entry]
+        error = error_after(goals, task.spread, mx, my, ct, st)
         soon = time + prices.error * error
         good, ending = soon + prices.miss < best[0].score, error <= prices.capture and soon < ends[-1].score
-        if not (good or ending):
-            continue
-        dx, dy, turn = moves.shifts[entry]
-        x, y, angle = node.x + c * dx - s * dy, node.y + s * dx + c * dy, node.angle + turn
-        lead_x, lead_y = moves.leads[entry]
-        if inside(
-            task.finger_walls, node.x + c * lead_x - s * lead_y, node.y + s * lead_x + c * lead_y, 0.0
-        ) and fits(task, x, y, angle, slack):
+        if (good or ending) and _is_free(moves, task.room, at, entry, slack):
             new = child[0]
+            _carry_out(moves, node, entry, new)
             new.time, new.error, new.parent, new.entry = time, error, row, entry
-            new.x, new.y, new.angle = x, y, angle
-            new.finger_x, new.finger_y = moves.fingers[entry]
             if ending:
                 new.score = soon
                 _insert(ends, child)
-            if good:
-                new.score = soon + prices.miss
+            new.score = soon + prices.miss + prices.error * _detour(task, new, error)
+            if new.score < best[0].score:
                 best[0] = child[0]
     if best[0].entry >= 0:
         _insert(beam, best)
+
+
+@njit(cache=True, error_model="numpy")
+def _carry_out(moves: Moves, node: Any, entry: int, new: Any) -> None:
+    """Pose and finger after a push."""
+    c, s = np.cos(node.angle), np.sin(node.angle)
+    dx, dy, turn = moves.shifts[entry]
+    new.x, new.y, new.angle = node.x + c * dx - s * dy, node.y + s * dx + c * dy, node.angle + turn
+    new.finger_x, new.finger_y = moves.fingers[entry]
+
+
+@njit(cache=True, error_model="numpy")
+def _is_free(moves: Moves, room: Room, at: Nodes, entry: int, slack: float) -> bool:
+    """Whether a push ends where object and finger may be; among obstacles, whether the pushes that it begins with do so, too."""
+    node = at[0]
+    c, s = np.cos(node.angle), np.sin(node.angle)
+    lead_x, lead_y = moves.leads[entry]
+    if not finger_fits(room, node.x + c * lead_x - s * lead_y, node.y + s * lead_x + c * lead_y):
+        return False
+    alone = len(room.obstacles.first) == 1
+    for k in range(entry if alone else moves.shorter[entry], entry + 1):
+        dx, dy, turn = moves.shifts[k]
+        if not fits(room, node.x + c * dx - s * dy, node.y + s * dx + c * dy, node.angle + turn, slack):
+            return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _detour(task: Task, node: Any, error: float) -> float:
+    """By how much the way round the obstacles is longer than the error."""
+    c, s = np.cos(node.angle), np.sin(node.angle)
+    x, y = (
+        node.x + c * task.centroid[0] - s * task.centroid[1],
+        node.y + s * task.centroid[0] + c * task.centroid[1],
+    )
+    return max(0.0, way_round(task.room.field, x, y) - error)
 
 
 @njit(cache=True, error_model="numpy")
