@@ -23,7 +23,7 @@ from expert.contact.sequence import sequence_of
 from expert.contact.tree import NEGLIGIBLE, Outcome
 from expert.errors import SolverFailed
 from expert.geometry.pose import Array
-from expert.problems.contact import ContactTask, Plan, Status
+from expert.problems.contact import ContactTask, Plan, Stated, Status
 from expert.world.environment import Environment
 from expert.world.fingers import Fingers
 from expert.world.motion import Trajectory
@@ -106,4 +106,5 @@ def _with_plan(task: ContactTask, scaled: ScaledTask, outcome: Outcome, z: Array
     if not closed:
         spent = "the budget was spent before the gap closed"
         verdict = {"status": "feasible", "reason": spent if outcome.limited else STUCK}
-    return replace(plan, bound=bound, **verdict)
+    plan = replace(plan, bound=bound, **verdict)
+    return replace(plan, stated=Stated(gap=plan.gap, asked=gap))

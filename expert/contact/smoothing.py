@@ -29,7 +29,8 @@ def least_smoothing(scaled: ScaledTask, modes: IntArray, assigned: IntArray) -> 
         return float(s.q0), -1, none  # parked
     A, b = standing_rows(scaled, Box(s, s.lo, s.hi, assigned), s.size)
     ridge = FLAT * (1 + scaled.acceleration_weight)
-    H, reference, least, z = s.Q + ridge * np.eye(s.size), s.reference, 0.0, s.reference
+    H, reference, least, proved = s.Q + ridge * np.eye(s.size), s.reference, 0.0, none
+    z = reference
     for _ in range(PROXIMAL):
         status, z, u = solve_qp(H, s.q - ridge * reference, A, b, np.int64(0), scaled.iterations)
         u = np.maximum(u, 0.0)
@@ -41,8 +42,10 @@ def least_smoothing(scaled: ScaledTask, modes: IntArray, assigned: IntArray) -> 
             return 0.0, -1, none
         slope = s.Q @ z + s.q - u @ A
         bound = smoothing(s, z) + u @ (b - A @ z) + least_over_box(scaled, s.lo, s.hi, z, slope)
-        least, reference = max(least, float(bound)), z
+        reference = z
+        if bound > least:
+            least, proved = float(bound), accelerations(s, z)[:, 0].copy()
         if smoothing(s, z) - least <= TIGHT * (1 + least):
             break
     t, _, _ = worst_intrusion(scaled, Box(s, s.lo, s.hi, assigned), z)
-    return least, t, accelerations(s, z)[:, 0].copy()
+    return least, t, proved

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from expert.contact.imbalance import nearly_balanced
 from expert.contact.scaled import ScaledTask
 from expert.geometry.pose import Array
 from expert.numeric.qp import FAILED, INFEASIBLE, SOLVED, compiled, solve_qp
@@ -33,7 +34,7 @@ class Stance(NamedTuple):
 class Balance(NamedTuple):
     """status, cost reached, certified lower bound, multipliers y (3,) of the wrench balance, ray weights x.
 
-    status INFEASIBLE only where y proves it, which `shortfall` confirms; FAILED leaves the bound of y = 0 and no more.
+    status INFEASIBLE only where y proves it, which `shortfall` confirms; SOLVED up to an imbalance of CERTAIN; FAILED leaves a bound.
     """
 
     status: int
@@ -245,18 +246,25 @@ def solve_step(scaled: ScaledTask, stance: Stance) -> Balance:
         return Balance(INFEASIBLE, np.inf, np.inf, y, g)
     status, x, u = solve_qp(H, g, A, b, np.int64(3), scaled.iterations)
     y[:] = u[:3]
-    if status == SOLVED:
-        cost, bound = program_cost(H, g, x), cost_bound(scaled, stance, y)
-        if cost - bound > CERTAIN * (1 + abs(cost)):
-            trivial = cost_bound(scaled, stance, np.zeros(3))
-            if trivial > bound:
-                bound, y[:] = trivial, 0.0
-        return Balance(SOLVED, cost, bound, y, x)
-    if status == INFEASIBLE:
-        length = np.sqrt(y @ y)
-        if length > 0:
-            y /= length
-            if shortfall(scaled, stance, y) > CERTAIN:
-                return Balance(INFEASIBLE, np.inf, np.inf, y, x)
-    y[:] = 0.0
-    return Balance(FAILED, np.inf, cost_bound(scaled, stance, y), y, x)
+    if status == INFEASIBLE and proves(scaled, stance, y):
+        return Balance(INFEASIBLE, np.inf, np.inf, y, x)
+    if status != SOLVED:
+        success, x, y, missing = nearly_balanced(H, g, A, b, scaled.iterations)
+        status = SOLVED if success and np.sqrt(missing @ missing) <= CERTAIN else FAILED
+        if status == FAILED and success and proves(scaled, stance, missing):
+            return Balance(INFEASIBLE, np.inf, np.inf, missing, x)
+    cost, bound = program_cost(H, g, x) if status == SOLVED else np.inf, cost_bound(scaled, stance, y)
+    if status != SOLVED or cost - bound > CERTAIN * (1 + abs(cost)):
+        trivial = cost_bound(scaled, stance, np.zeros(3))
+        if trivial > bound:
+            bound, y[:] = trivial, 0.0
+    return Balance(status, cost, bound, y, x)
+
+
+@compiled
+def proves(scaled: ScaledTask, stance: Stance, y: Array) -> bool:
+    """Scale multipliers to length one; whether they prove that there is no balance."""
+    length = float(np.sqrt(y @ y))
+    if length > 0.0:
+        y /= length
+    return length > 0.0 and shortfall(scaled, stance, y) > CERTAIN

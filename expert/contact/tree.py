@@ -18,6 +18,7 @@ from expert.contact.relaxation import Goal, Relaxed, relax
 from expert.contact.scaled import ScaledTask
 from expert.contact.sequence import Sequence
 from expert.contact.smoothing import least_smoothing
+from expert.contact.steps import CERTAIN
 from expert.geometry.pose import Array
 
 ROUNDS = 25
@@ -26,8 +27,8 @@ NEGLIGIBLE = 1e-9
 """Costs are not told apart below this [`cost_unit`]: what costs nothing has no relative gap."""
 MIDDLE = 0.35
 """A box is split where the relaxation's solution lies, but no nearer to an end than this share of its width."""
-NARROWEST = 1e-9
-"""Boxes are not split below this width of rho."""
+UNEVEN, SLIVER = 1 / 16, 1e-6
+"""A range is not split while the share of it that is left is so much smaller than another's; ranges of less count as so wide."""
 
 
 class AtRho(NamedTuple):
@@ -54,9 +55,10 @@ class Proof(NamedTuple):
 
 @dataclass(eq=False, slots=True)
 class Node:
-    """A box, the proof of its bound once it was visited, and how it was split."""
+    """A box, widths of the ranges of rho that its sequence began with, the proof of its bound once it was visited, how it was split."""
 
     box: Box
+    span: Array
     proof: Proof | None = None
     split: AtRho | ByRegion | None = None
     parts: list["Node"] = field(default_factory=list)
@@ -64,7 +66,7 @@ class Node:
     @classmethod
     def root(cls, sequence: Sequence, lo: Array, hi: Array) -> "Node":
         """The box of a sequence, no region imposed."""
-        return cls(Box(sequence, lo, hi, np.full_like(sequence.modes, -1)))
+        return cls(Box(sequence, lo, hi, np.full_like(sequence.modes, -1)), hi - lo)
 
     def at_rho(self, interval: int, at: float) -> list["Node"]:
         """Split the range of an interval in two."""
@@ -72,7 +74,8 @@ class Node:
         below, above = hi.copy(), lo.copy()
         below[interval] = above[interval] = at
         self.split = AtRho(interval, at)
-        self.parts = [Node(Box(sequence, lo, below, assigned)), Node(Box(sequence, above, hi, assigned))]
+        boxes = (Box(sequence, lo, below, assigned), Box(sequence, above, hi, assigned))
+        self.parts = [Node(box, self.span) for box in boxes]
         return self.parts
 
     def by_region(self, step: int, finger: int, regions: int) -> list["Node"]:
@@ -82,7 +85,7 @@ class Node:
         for region in range(regions):
             assigned = imposed.copy()
             assigned[step, finger] = region
-            self.parts.append(Node(Box(sequence, lo, hi, assigned)))
+            self.parts.append(Node(Box(sequence, lo, hi, assigned), self.span))
         return self.parts
 
 
@@ -181,12 +184,20 @@ class Tree:
                 yield max(bound, apart), part
             return
         width = node.box.hi - node.box.lo
+        narrowest = CERTAIN / max(
+            1.0, 4 * self.scaled.max_force
+        )  # such a box is balanced everywhere or nowhere
         exact = found.chord_error.max(initial=0.0) <= 1e-6 * abs(found.bound)  # then the widest is split
-        error = np.where(width > NARROWEST, width if exact else found.chord_error, -np.inf)
+        error = np.where(width > narrowest, width if exact else found.chord_error, -np.inf)
         if error.max(initial=-np.inf) <= 0:
             self.pruned = min(self.pruned, bound)  # too narrow to split: it stays open
             return
         k = int(error.argmax())
+        share = np.where(width > narrowest, width / np.maximum(node.span, SLIVER), 0.0)
+        if (
+            share[k] < UNEVEN * share.max()
+        ):  # an error that is seen at one place only would cut slices without end
+            k = int(share.argmax())
         room = MIDDLE * width[k]
         at = float(np.clip(found.last[k], node.box.lo[k] + room, node.box.hi[k] - room))
         for part in node.at_rho(k, at):

@@ -23,6 +23,7 @@ from expert.problems.contact import (
     Cost,
     Plan,
     Robustness,
+    Stated,
 )
 from expert.world.environment import Environment
 from expert.world.fingers import Fingers
@@ -125,6 +126,8 @@ def read_answer(problem: Problem, file: Section) -> Plan:
     """The plan of a solution file, checked for form (its truth is what `expert.verify` checks).  Raises InvalidProblem."""
     summary, task, numbering = file.values(Plan), problem.task, Numbering.of(problem.data)
     summary["certificate"] = _read_certificate(file)
+    gap = file.number("gap") if "gap" in file else np.nan
+    summary["stated"] = Stated(gap=gap, asked=problem.options["gap"])
     if summary["status"] not in ("optimal", "feasible"):
         return Plan(**summary)
     shape = (task.steps, task.fingers.count, 2)

@@ -147,6 +147,14 @@ class ContactForce:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Stated:
+    """What is said of a plan's optimality: its gap (nan: nothing), and the gap that was asked for, at which it is `optimal`."""
+
+    gap: float
+    asked: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Plan:
     """Answer to a ContactTask.
 
@@ -154,6 +162,7 @@ class Plan:
     objective, bound: SI cost and its certified lower bound.  modes (T, C): facet or FREE.
     positions (T, C, 2) [m] and forces (T, C, 2) [N, on the object], world frame.  Empty arrays where there is no plan.
     certificate: what proves the bound, or that there is no plan (docs/theory/contact-certificate.md); None where nothing does.
+    stated: what is said of its optimality, for the checker; None: nothing.
     """
 
     status: Status
@@ -168,6 +177,7 @@ class Plan:
     residual: float = np.nan
     reason: str = ""
     certificate: dict[str, Any] | None = field(default=None, repr=False, compare=False)
+    stated: Stated | None = field(default=None, repr=False, compare=False)
 
     @property
     def gap(self) -> float:

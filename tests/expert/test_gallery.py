@@ -11,25 +11,27 @@ from expert.drawing.contact_trajectory import COLUMNS, FRAMES_PER_STEP
 from expert.drawing.marks import FINGER, FINGER_FORCE, OBJECT, WALL
 from expert.files import read_problem
 from expert.verify.plan.check import verify
+from expert.verify.plan.claims import EFFORT
 from tests.support.pictures import coloured, frames_of
 
 PROBLEMS = sorted(Path("configs/problem/contact_trajectory").glob("*.yaml"))
-UNPROVED = "tool_pivot_one_finger"
-"""Infeasible because contacts must persist, which the checker's step-by-step proof cannot show."""
+SEQUENCES = "tool_pivot_one_finger"
+"""Infeasible because contacts must persist: each step by itself can be balanced."""
 
 
 @pytest.mark.parametrize("path", PROBLEMS, ids=lambda p: p.stem)
 def test_verdicts_of_solver_and_checker(path: Path) -> None:
     problem = read_problem(path)
     answer = solve(problem.task, **problem.options)
-    impossible = path.stem.endswith("_infeasible") or path.stem == UNPROVED
+    impossible = path.stem.endswith("_infeasible") or path.stem == SEQUENCES
     assert answer.status == ("infeasible" if impossible else "optimal")
     report = verify(problem.task, answer)
-    assert report.verdict == ("unknown" if path.stem == UNPROVED else "sound"), str(report)
+    assert report.verdict == "sound", str(report)
+    assert report.claimed == EFFORT
 
 
 SHOWN = [
-    path for path in PROBLEMS if not path.stem.endswith("_infeasible") and path.stem != UNPROVED
+    path for path in PROBLEMS if not path.stem.endswith("_infeasible") and path.stem != SEQUENCES
 ]  # fmt: skip
 
 

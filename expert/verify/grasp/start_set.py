@@ -42,7 +42,7 @@ class StartSet:
                         seen.add((other, j))
                         queue.append((other, j))
         prisms: dict[Cell, list[int]] = {}
-        for cell, k in seen:
+        for cell, k in sorted(seen):  # so that a seed draws the same starts, however cells are numbered
             prisms.setdefault(cell, []).append(k)
         return prisms
 

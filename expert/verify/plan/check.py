@@ -14,8 +14,8 @@ from expert.errors import InvalidProblem
 from expert.geometry.polygon import signed_distance
 from expert.geometry.pose import Array, cross, to_body
 from expert.problems.contact import FREE, ContactTask, Plan
+from expert.verify.plan.claims import EFFORT, NUMBERS, check_infeasible, with_claims
 from expert.verify.plan.environment import environment_checks
-from expert.verify.plan.force_balance import first_unbalanced_step
 from expert.verify.plan.report import Check, PlanReport
 
 FINGER = ("step", "finger")
@@ -32,34 +32,20 @@ class Tolerances:
 
 
 def verify(task: ContactTask, answer: Plan | None) -> PlanReport:
-    """Judge any answer: plans by `check_plan`, proofs of infeasibility by an independent search for force balance."""
+    """Judge any answer: plans by `check_plan`, bounds and proofs that there is no plan by what they are proved with."""
     if answer is None:
         raise InvalidProblem(
             "file", expected="a solution file", got="a problem file", remedy="solve it first"
         )
     budget = Budget(np.inf)
     if answer.found:
-        unproved = (("status",) if answer.status == "optimal" else ()) + ("bound", "gap")
-        report = replace(check_plan(task, answer), claimed=unproved)
+        report = with_claims(task, answer, check_plan(task, answer))
     elif answer.status == "infeasible":
-        report = check_infeasible(task)
+        report = check_infeasible(task, answer)
     else:
-        report = PlanReport(
-            verdict="unknown", claim=answer.status, reason="no plan was found: nothing to check"
-        )
-    effort = ("seconds", "nodes", "reason")
-    unread = () if answer.found else ("objective", "bound", "gap", "residual")
-    return replace(report, claimed=(*report.claimed, *unread, *effort), seconds=budget.spent)
-
-
-def check_infeasible(task: ContactTask) -> PlanReport:
-    """sound where some step admits no force balance at all; unknown where each step does, taken by itself."""
-    step = first_unbalanced_step(task)
-    if step is not None:
-        reason = f"no finger placement balances the forces at step {step}"
-        return PlanReport(verdict="sound", claim="infeasible", reason=reason)
-    reason = "every step by itself admits a force balance; contact sequences are not searched"
-    return PlanReport(verdict="unknown", claim="infeasible", reason=reason)
+        reason = "no plan was found: nothing to check"
+        report = PlanReport(verdict="unknown", claim=answer.status, reason=reason, claimed=NUMBERS)
+    return replace(report, claimed=(*report.claimed, *EFFORT), seconds=budget.spent)
 
 
 def check_plan(task: ContactTask, plan: Plan, tolerances: Tolerances | None = None) -> PlanReport:

@@ -7,7 +7,6 @@ every split into all of its parts, and each part has multipliers whose dual valu
 data from outside: whatever it says, only what these sums show is believed.
 """
 
-import binascii
 import itertools
 from typing import Any
 
@@ -31,13 +30,15 @@ def objection(task: ContactTask, certificate: Any, bound: float) -> str:
     if not covers_the_outside(task):
         return "the free regions do not cover the outside of the object"
     target = bound / cost_unit(task)
+    if target == -np.inf:
+        return "there is no bound to prove"
     if np.isfinite(target):
         target -= CLOSE * abs(target)
     try:
         Walk(task, certificate).require(target)
     except Unproved as error:
         return str(error)
-    except (KeyError, TypeError, IndexError, ValueError, binascii.Error, RecursionError):
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError):
         return "the certificate is malformed"
     return ""
 

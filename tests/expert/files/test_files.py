@@ -1,6 +1,7 @@
 """Files of all kinds: every shipped problem is read, and what was made in Python or solved is written so that it reads alike."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from expert.files import (
 )
 from expert.kinds import KINDS
 from expert.problems.cage import Arrangement, CageProblem, CageSolution, Meeting
+from expert.problems.contact import ContactOptions, Stated
 from expert.problems.grasp import GraspProblem, GraspSolution
 from expert.world.fingers import Gripper
 from expert.world.named import named_shape
@@ -86,6 +88,7 @@ def test_a_problem_made_in_python_keeps_its_options() -> None:
         problem_for(3)
 
 
+SLIDING = sliding_block()
 ANSWERS = {
     "cage": (
         CAGE,
@@ -111,7 +114,7 @@ ANSWERS = {
         GraspSolution(status="certified", path=np.arange(40.0).reshape(5, 4, 2), facets=(3, 0, 1, 2), objective=2.0),
     ),
     "no grasp": (GRASP, GraspSolution(status="time_limit")),
-    "plan": sliding_block(),
+    "plan": (SLIDING[0], replace(SLIDING[1], stated=Stated(gap=0.0, asked=ContactOptions.gap))),
 }  # fmt: skip
 
 

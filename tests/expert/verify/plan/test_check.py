@@ -11,8 +11,7 @@ import pytest
 
 from expert.errors import InvalidProblem
 from expert.problems.contact import FREE, SUPPORT, ContactForce, ContactTask, Cost, Plan, Robustness
-from expert.verify.plan.check import check_infeasible, check_plan, verify
-from expert.world.motion import Trajectory
+from expert.verify.plan.check import check_plan, verify
 from expert.world.walls import HalfPlane
 from tests.support.hand_plans import TOP, WEIGHT, A, lifted_block, pushed_block, sliding_block
 
@@ -269,32 +268,6 @@ def test_acceleration_cost_counts_backward_differences_from_the_third_step() -> 
     plan = replace(plan, positions=changed(plan.positions, (4, 1), [0.0, 0.21]))
     cost = plan.objective + (0.01 / 0.1**2) ** 2
     assert check_plan(task, replace(plan, objective=cost, bound=cost)).verdict == "sound"
-
-
-def one_finger_cannot_lift() -> ContactTask:
-    task, _ = lifted_block()
-    return replace(task, fingers=replace(task.fingers, count=1))
-
-
-def test_infeasibility_is_proved_without_the_solver_where_one_step_suffices() -> None:
-    report = check_infeasible(one_finger_cannot_lift())
-    assert report.verdict == "sound"
-    assert "step 0" in report.reason
-
-
-@pytest.mark.parametrize("made", [sliding_block, lifted_block, pushed_block])
-def test_a_feasible_task_is_never_proved_infeasible(made: Made) -> None:
-    task, plan = made()
-    report = verify(task, replace(plan, status="infeasible"))
-    assert report.verdict == "unknown"
-
-
-@pytest.mark.parametrize(("height", "verdict"), [(0.1, "unknown"), (0.001, "sound")])
-def test_the_proof_knows_that_fingers_do_not_fit_under_a_low_block(height: float, verdict: str) -> None:
-    """One finger carries a block from below; not where the floor is 1 mm under it and 2 mm of clearance are asked for."""
-    task = one_finger_cannot_lift()
-    raised = Trajectory.of(task.trajectory.poses + [0.0, height, 0.0], task.trajectory.dt)
-    assert check_infeasible(replace(task, trajectory=raised)).verdict == verdict
 
 
 def test_an_answer_without_a_plan_is_unknown_and_a_bare_problem_refused() -> None:
