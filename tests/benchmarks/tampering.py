@@ -3,8 +3,9 @@
     python -m tests.benchmarks.tampering [--quick] [--files 10000] [--first 0] [--json FILE]
 
 Of ten files eight are contact plans and proofs that there is none, one or two cages, one in fifty a grasp, solved first.  A value is a lie
-where the report does not list its field as claimed.  Cages whose fingers were
+where the report does not list its field as claimed, unless it is within RESOLUTION of the true one.  Cages whose fingers were
 moved and grasps whose path was are judged by others: a random tree search that must not escape, executions that must arrive.
+A certificate that still proves what the file says is none.
 Bar: no lie is accepted.
 """
 
@@ -22,7 +23,7 @@ from rich.progress import track
 from rich.table import Table
 
 from expert.errors import InvalidProblem
-from expert.files import Solution, read_problem, solution_fields, solution_of
+from expert.files import read_problem, solution_fields, solution_of
 from expert.grasping.sweeping import sweep
 from expert.kinds import KINDS
 from tests.support.refuter import random_escape
@@ -31,7 +32,7 @@ FOLDER = Path(__file__).resolve().parents[2] / "configs" / "problem"
 FILES = {
     "contact_trajectory": (
         "block_pivot_two_fingers", "block_slide_one_finger", "transverse_rotation_two_fingers",
-        "triangle_pivot_two_fingers", "tee_lift_two_fingers", "block_lift_one_finger_infeasible",
+        "triangle_pivot_two_fingers", "tee_lift_two_fingers", "block_lift_one_finger_infeasible", "tool_pivot_one_finger",
     ),
     "cage": ("i_3", "t_wall", "m_grippers", "hourglass_min"),
     "certified_grasp": ("hourglass_3",),
@@ -40,12 +41,14 @@ SHARES = {"contact_trajectory": 0.84, "cage": 0.14, "certified_grasp": 0.02}
 CONFIRMED = ("sound", "caged", "certified")
 TRUE_ALIKE = (["status", "feasible"], ["status", "uncertified"])
 """What says less than the truth."""
+RESOLUTION = 1e-8
+"""Numbers [SI] that differ by less say the same: a residual of 1e-16 is one of 2e-16, which rounding decides."""
 
 
 def tampered(data: dict[str, Any], rng: np.random.Generator) -> tuple[dict[str, Any], str]:
     """A copy with one value changed, and the field in which it was."""
     copied = copy.deepcopy(data)
-    field = str(rng.choice(sorted(copied.keys() - {"problem", "certificate"})))
+    field = str(rng.choice(sorted(copied.keys() - {"problem"})))
     place: Any = copied
     key: Any = field
     while isinstance(place[key], list | dict) and place[key]:
@@ -53,6 +56,17 @@ def tampered(data: dict[str, Any], rng: np.random.Generator) -> tuple[dict[str, 
         key = rng.choice(sorted(place)) if isinstance(place, dict) else int(rng.integers(len(place)))
     place[key] = another(place[key], rng)
     return copied, field
+
+
+def alike(a: Any, b: Any) -> bool:
+    """The same but for RESOLUTION of each number."""
+    if isinstance(a, float) and isinstance(b, float):
+        return abs(a - b) <= RESOLUTION
+    if isinstance(a, list) and isinstance(b, list):
+        return len(a) == len(b) and all(map(alike, a, b))
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(alike(a[key], b[key]) for key in a)
+    return bool(a == b)
 
 
 def another(value: Any, rng: np.random.Generator) -> Any:
@@ -82,11 +96,14 @@ def another(value: Any, rng: np.random.Generator) -> Any:
 
 
 def is_lie(
-    field: str, told: dict[str, Any], report: Any, solution: Solution, rng: np.random.Generator
+    field: str, told: dict[str, Any], true: dict[str, Any], report: Any, rng: np.random.Generator
 ) -> bool:
     """Whether what was confirmed is false, by other means where the change alone does not say so."""
-    if field in report.claimed or [field, told[field]] in TRUE_ALIKE:
+    if field in report.claimed or [field, told[field]] in TRUE_ALIKE or alike(told[field], true[field]):
         return False
+    if field == "certificate":
+        return False  # what it proves is true, however it does so
+    solution = solution_of(told)
     task, answer = solution.problem.task, solution.answer
     if field == "rotation_range":
         return (
@@ -105,7 +122,7 @@ def is_lie(
     return True
 
 
-def judge(data: dict[str, Any], field: str, rng: np.random.Generator) -> str:
+def judge(data: dict[str, Any], true: dict[str, Any], field: str, rng: np.random.Generator) -> str:
     """refused, not confirmed, claimed, true, or LIE."""
     try:
         solution = solution_of(data)
@@ -114,7 +131,7 @@ def judge(data: dict[str, Any], field: str, rng: np.random.Generator) -> str:
         return "refused"
     if report.verdict not in CONFIRMED:
         return "not confirmed"
-    if is_lie(field, data, report, solution, rng):
+    if is_lie(field, data, true, report, rng):
         return "LIE"
     return "claimed" if field in report.claimed else "true"
 
@@ -135,8 +152,9 @@ def main() -> int:
     for seed in track(seeds, "tampering", console=console, disable=not console.is_terminal):
         rng = np.random.default_rng(seed)
         kind = str(rng.choice(list(SHARES), p=list(SHARES.values())))
-        data, field = tampered(solved[kind][rng.integers(len(solved[kind]))], rng)
-        outcome = judge(data, field, rng)
+        true = solved[kind][rng.integers(len(solved[kind]))]
+        data, field = tampered(true, rng)
+        outcome = judge(data, true, field, rng)
         outcomes[kind, outcome] += 1
         if outcome == "LIE":
             accepted.append(f"seed {seed}: {kind}, {field}")

@@ -98,19 +98,27 @@ def test_three_fingers_that_hold_to_second_order_bring_every_start_to_the_goal()
 
 
 @pytest.mark.parametrize("name", ["I, late", "quadrangle", "I, early", "MIQP2's answer"])
-def test_what_jams_in_the_sweeping_process_jams_in_the_contact_simulator(name: str) -> None:
-    """Nested cages with a form-closed end: the checker's witness is held elsewhere, though other starts do arrive."""
+def test_what_jams_in_the_sweeping_process_jams_in_the_contact_simulator(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nested cages with a form-closed end: the checker's witness is held elsewhere, though other starts do arrive.
+
+    Fingers ten times as stiff as by default: three of the quadrangle's hold it against the support's friction up to 0.2 deg and
+    0.2 % of its size from the goal, by so much as their springs give (at most 0.01 deg and 0.01 % here).
+    """
+    monkeypatch.setattr("dlm.simulator.grasp.STIFFNESS_PER_MASS", 1e7)
     problem, path = jams()[name]
     report = verify_grasp(problem, path)
     assert report.verdict == "refuted"
     assert report.dead_ends
     assert report.start
     starts = report.start.starts(np.random.default_rng(0), 20)
-    arriving = starts[np.isnan(sweep(problem.shape, path, starts).stalled)][:1]
+    arriving = starts[np.isnan(sweep(problem.shape, path, starts).stalled)][:3]
+    assert len(arriving) == 3
     assert report.dead_ends.witness is not None
     ends = replay_grasp(problem, path, np.stack([report.dead_ends.witness, *arriving]))[:, -1] - problem.pose
-    witness, other = np.linalg.norm(ends[:, :2], axis=1) / problem.shape.size
-    assert witness > 0.01
-    assert abs(ends[0, 2]) > np.radians(2)
-    assert other < 1e-3
-    assert abs(ends[1, 2]) < np.radians(0.25)  # this start ended at .19 in the earlier simulator too
+    distance, angle = np.linalg.norm(ends[:, :2], axis=1) / problem.shape.size, np.abs(ends[:, 2])
+    assert distance[0] > 0.01
+    assert angle[0] > np.radians(2)
+    assert distance[1:].max() < 1e-3
+    assert angle[1:].max() < np.radians(0.1)
