@@ -43,8 +43,8 @@ TIGHT = np.radians(20)
 WIDE = np.radians(75)
 """Far apart or close together, free fingers hold an object loosely: with a cost the ladder begins with such ranges."""
 THESIS_LADDER = ((np.radians(40), np.radians(40)), (np.radians(90), np.radians(90)))
-THESIS_SLICES = 9
-"""Slices of MIP1, as many as in Thesis 5.1.7."""
+THESIS_SLICES, THESIS_FACETS = 9, 16
+"""Slices of MIP1, as many as in Thesis 5.1.7, and the most facets: limit contacts (5-CT8) are as many as their triples."""
 QUICK = 3
 """Ranges of the ladder that the quick part tries."""
 KNOWN: dict[CageStatus, str] = {
@@ -82,7 +82,7 @@ def solve(
     time_limit [s] is processor time: what is found does not depend on the machine's load.
 
     Raises InvalidProblem for an arrangement whose fingers are given: there is nothing to solve; and for a problem that
-    MIP1 (method thesis) does not know: walls, fixed fingers, grippers, costs.
+    MIP1 (method thesis) does not know: walls, fixed fingers, grippers, costs, more than THESIS_FACETS facets.
     """
     if isinstance(problem, Arrangement):
         raise InvalidProblem(
@@ -129,6 +129,10 @@ def _search_slices(tally: Tally, solver: CageSolver) -> None:
     if len(problem.fixed) or len(problem.walls) or problem.grippers or problem.cost != "none":
         extras = "fixed fingers, walls, grippers or a cost"
         raise InvalidProblem("options.method", expected="swept where the problem has " + extras, got="thesis")
+    facets = len(problem.shape.vertices)
+    if facets > THESIS_FACETS:
+        most = f"swept for more than {THESIS_FACETS} facets"
+        raise InvalidProblem("options.method", expected=most, got=f"thesis for {facets}")
     frame = Frame.of(problem.shape, problem.pose)
     for below, above in problem.rotation or THESIS_LADDER:
         if tally.budget.over or tally.best.found:

@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -48,6 +49,9 @@ BATCH, MIP_SECONDS = 24, 5.0
 """The decomposed search ranks so many grasps at once, and gives each choice of a topology this long [s]."""
 SHARES = (0.98, 0.75)
 """Shares of its region of attraction that a path of the decomposed search is tried with."""
+
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -108,18 +112,43 @@ class RelativeProblem:
 
     def cells(self) -> Iterator[tuple[GoalCell, Places]]:
         """Facets and rays, the firmest first, with every way to put labelled fingers there."""
-        ways = placements(self.problem)
-        for cell, places in itertools.product(self._ranked, ways):
+        for known in self._worked_out:
             if self.budget.over:
                 return
-            held = None
-            if self.problem.grippers:
-                middles = 0.5 * (self.table.low + self.table.high)[:, None] * self.table.tangents
-                feet = middles + self.table.offsets[:, None] * self.table.normals
-                held = jaws(self.problem, self.frame, places, feet[list(cell.chosen)])
-            labelled = replace(cell, jaws=held)
-            if held is None or can_end(labelled):
-                yield labelled, places
+            yield known
+
+    @cached_property
+    def _worked_out(self) -> "Remembered[tuple[GoalCell, Places]]":
+        """What grippers do to a cell is worked out once, when it is first asked for."""
+        return Remembered(self._labelled())
+
+    def _labelled(self) -> Iterator[tuple[GoalCell, Places]]:
+        middles = 0.5 * (self.table.low + self.table.high)[:, None] * self.table.tangents
+        feet = middles + self.table.offsets[:, None] * self.table.normals
+        for cell, places in itertools.product(self._ranked, placements(self.problem)):
+            if self.budget.over:
+                return
+            if not self.problem.grippers:
+                yield cell, places
+                continue
+            held = replace(cell, jaws=jaws(self.problem, self.frame, places, feet[list(cell.chosen)]))
+            if can_end(held):
+                yield held, places
+
+
+class Remembered(Generic[T]):
+    """An iterator's items, for any number of loops: each is made when the first of them comes to it."""
+
+    def __init__(self, source: Iterator[T]) -> None:
+        self._source, self._known = source, list[T]()
+
+    def __iter__(self) -> Iterator[T]:
+        for k in itertools.count():
+            if k == len(self._known):
+                self._known.extend(itertools.islice(self._source, 1))
+            if k == len(self._known):
+                return
+            yield self._known[k]
 
 
 def goal_cells(task: RelativeProblem, share: float = 1.0) -> Iterator[Proposal]:

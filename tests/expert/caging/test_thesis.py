@@ -19,7 +19,7 @@ from expert.world.frame import Frame
 from expert.world.named import named_shape
 from expert.world.shape import Shape
 from expert.world.walls import Segment
-from tests.support.polygons import random_polygon
+from tests.support.polygons import random_polygon, regular_polygon
 
 NARROW = ((np.radians(40), np.radians(40)),)
 SMALL = ((np.radians(20), np.radians(20)),)
@@ -74,6 +74,14 @@ def test_a_spent_limit_is_called_that() -> None:
 def test_what_mip1_does_not_know_is_refused(extra: dict[str, object]) -> None:
     with pytest.raises(InvalidProblem, match=r"options\.method: expected swept"):
         solve(problem(named_shape("T"), **extra), method="thesis")
+
+
+def test_too_many_facets_for_mip1_are_refused() -> None:
+    task = problem(regular_polygon(17, 0.05))
+    with pytest.raises(
+        InvalidProblem, match=r"options\.method: expected swept for more than 16 facets, got thesis for 17"
+    ):
+        solve(task, method="thesis")
 
 
 class Scripted:

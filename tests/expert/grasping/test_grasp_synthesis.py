@@ -10,8 +10,10 @@ from expert.budget import Budget
 from expert.errors import InvalidProblem
 from expert.geometry.polygon import signed_area, signed_distance
 from expert.geometry.pose import Array, rotation, to_body
+from expert.grasping import proposals
 from expert.grasping.cell import GoalCell
 from expert.grasping.decomposed import fillings, smooth_path, topologies
+from expert.grasping.goal_cell import can_end
 from expert.grasping.gripper import placements
 from expert.grasping.nested import FacetGeometry, schedule, shut
 from expert.grasping.proposals import RelativeProblem, decomposed, goal_cells
@@ -187,6 +189,26 @@ def test_grippers_tell_fingers_apart_only_as_far_as_they_must() -> None:
         )
     }
     assert count == {0: 1, 1: 6, 2: 12, 3: 6, 4: 24}
+
+
+def test_what_grippers_do_to_a_cell_is_worked_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    gripper = Gripper(fingers=(0, 1), opening=(0.01, 0.09))
+    task = RelativeProblem(problem(quadrangle(0), grippers=(gripper,)), Budget(FOREVER))
+    calls: list[GoalCell] = []
+
+    def counted(cell: GoalCell) -> bool:
+        calls.append(cell)
+        return can_end(cell)
+
+    monkeypatch.setattr(proposals, "can_end", counted)
+    first = list(itertools.islice(task.cells(), 3))
+    until_then = len(calls)
+    all_of_them = list(task.cells())
+    assert until_then < len(calls)
+    again = list(task.cells())
+    assert again[:3] == all_of_them[:3] == first
+    assert len(again) == len(all_of_them) > 3
+    assert len(calls) == len(task._ranked) * len(placements(task.problem))
 
 
 def test_three_fingers_hold_to_second_order() -> None:
