@@ -3,10 +3,11 @@
 import os
 import signal
 import threading
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
-from typing import Literal, Protocol, TypeVar
+from typing import Any, Literal, Protocol, TypeVar
 
 import joblib
 from joblib.externals.loky.process_executor import BrokenProcessPool
@@ -38,7 +39,7 @@ def side_by_side(
     with joblib.parallel_config(backend=backend, n_jobs=jobs):
         try:
             if backend == "loky":
-                yield from joblib.Parallel(return_as="generator_unordered", batch_size=1)(work)
+                yield from _unordered(work)
                 return
             wave = WAVE * joblib.effective_n_jobs(jobs)
             for start in range(0, len(work), wave):
@@ -46,6 +47,17 @@ def side_by_side(
         except BrokenProcessPool as error:
             why = str(error).splitlines()[0]
             raise SolverFailed(f"a worker died ({why}); {again} goes on from there") from error
+
+
+def _unordered(work: Sequence[Any]) -> Iterator[Any]:
+    results = joblib.Parallel(return_as="generator_unordered", batch_size=1)(work)
+    try:
+        for result in results:  # noqa: UP028 - `yield from` would close it first, and not quietly
+            yield result
+    finally:
+        with warnings.catch_warnings():  # who stops early knows that calls are left
+            warnings.filterwarnings("ignore", message=r"\d+ tasks (have been|which were)")
+            results.close()
 
 
 def _quietly(call: Callable[[], T], master: int) -> T:

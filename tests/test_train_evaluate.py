@@ -193,9 +193,8 @@ def test_the_command_that_training_names_judges_the_structured_model_too(workpla
     lines = json.loads((workplace / "runs" / "structured" / "table_4_1.json").read_text())["lines"]
     assert [line["model"] for line in lines] == ["no action", "MDR", "MIQP (oracle)"]
     learned = lines[1]["cells"]["train"]
-    assert (
-        len(learned["unsolved"][0]) <= 2
-    )  # of four; the small videos of the smoke set are perceived less often than they should be
+    # After so little training a first guess, which nothing checks, may have no plan for tasks that begin with a lift.
+    assert len(learned["unsolved"][0]) <= 2
     assert learned["ratio"] < 1
 
 

@@ -19,10 +19,12 @@ FAINTEST = 12.0
 """Colours differ from this distance on [grey levels]."""
 LEAST_MOVING = 0.03
 """Of a thing that moves, so much changes colour at least."""
-THING = 6
-"""Pixels that make a thing."""
 FEWEST = 8
 """Pixels that tell the object's colour."""
+BRIGHTNESS = np.array([0.299, 0.587, 0.114])
+"""Of red, green and blue (ITU-R BT.601), as compression has it."""
+SAME_FRAME = np.pad(np.ones((1, 3, 3)), ((1, 1), (0, 0), (0, 0)))
+"""Neighbours of a pixel of (T, h, w)."""
 CROSS = np.array([[[0, 1, 0], [1, 1, 1], [0, 1, 0]]])
 
 
@@ -61,8 +63,9 @@ def separate(video: Frames, camera: Camera, floor: bool, blur: float = 0.0, code
     contrast = light * length**0.5
     precision = 1 / ((noise / contrast) ** 2 + MODEL_ERROR**2)
     odd = off > max(6 * noise, FOREIGN)
-    # What moves along, as fingers do, mixes its colour into the outline all the way; compression leaves odd pixels, but no things.
-    odd |= ndimage.binary_dilation(_things(odd & ~odd.all(axis=0)), CROSS, iterations=2)
+    # What moves along, as fingers do, mixes its colour into the outline all the way.
+    strange = off > max(FOREIGN, _colour_error(behind, line, ground) * float(np.median(light)))
+    odd |= ndimage.binary_dilation(_around(strange, odd) & ~odd.all(axis=0), CROSS, iterations=2)
     foreign = odd | _half_covered_areas(share, noise / contrast)
     foreign |= _standing(np.where(foreign, 0.0, share))
     return Appearance(share, np.broadcast_to(precision, share.shape), foreign, noise, contrast)
@@ -79,10 +82,16 @@ def _half_covered_areas(share: Array, deviation: Array) -> NDArrayBool:
     return np.asarray(ndimage.binary_dilation(odd, np.ones((1, 3, 3))))
 
 
-def _things(masks: NDArrayBool) -> NDArrayBool:
-    """The connected pieces of each mask (T, h, w) that are as large as THING."""
-    pieces, _ = ndimage.label(masks, np.pad(np.ones((1, 3, 3)), ((1, 1), (0, 0), (0, 0))))
-    return np.asarray((np.bincount(pieces[masks], minlength=pieces.max() + 1) >= THING)[pieces] & masks)
+def _around(cores: NDArrayBool, masks: NDArrayBool) -> NDArrayBool:
+    """The connected pieces of each mask (T, h, w) that contain a core."""
+    return np.asarray(ndimage.binary_propagation(cores & masks, SAME_FRAME, masks))
+
+
+def _colour_error(behind: Background, line: Array, ground: Array) -> float:
+    """By how much compression may change a pixel [grey levels]: it keeps brightness, but gives it a neighbour's hue."""
+    colours = np.stack([behind.wall, behind.wall + line, behind.image.reshape(-1, 3)[ground.argmax()]])
+    hues = colours - (colours @ BRIGHTNESS)[:, None]
+    return float(np.linalg.norm(hues[:, None] - hues, axis=-1).max())
 
 
 def _standing(share: Array) -> NDArrayBool:

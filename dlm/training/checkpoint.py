@@ -90,7 +90,8 @@ def read_about(path: Path, *, command: str) -> About:
             "checkpoint", expected=f"the file {path}", got="no such file", remedy=f"make it with: {command}"
         )
     try:
-        with safe_open(path, framework="pt") as file:
+        # As numpy: torch opens the path a second time, when another checkpoint may have taken its place.
+        with safe_open(path, framework="np") as file:
             about = json.loads((file.metadata() or {})["about"])
         if about.get("schema") != SCHEMA:
             raise InvalidProblem(

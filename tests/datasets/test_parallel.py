@@ -36,6 +36,13 @@ def test_a_dead_worker_is_no_answer() -> None:
         list(side_by_side([partial(os._exit, 1)], jobs=2, again="make it"))
 
 
+def test_who_stops_early_hears_nothing_of_it(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    answers = side_by_side([partial(call, tmp_path, k) for k in range(20)], jobs=2)
+    next(answers)
+    answers.close()  # type: ignore[attr-defined]
+    assert not recwarn.list
+
+
 def test_a_missing_backend_is_named() -> None:
     pytest.importorskip("joblib")
     try:

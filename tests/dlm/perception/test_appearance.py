@@ -1,10 +1,11 @@
+import cv2
 import numpy as np
 import pytest
 
 from datasets.disturb import random_palette
-from datasets.render import render
+from datasets.render import Camera, Frames, render
 from dlm.perception import perceive
-from dlm.perception.appearance import _standing, _things
+from dlm.perception.appearance import _around, _standing, separate
 from tests.support.videos import errors, task_of
 
 
@@ -39,12 +40,39 @@ def test_where_nothing_moves_everything_may_be_the_object() -> None:
     assert not _standing(share).any()
 
 
-def test_a_few_odd_pixels_are_no_thing() -> None:
+def hues_of_half_size(frames: Frames) -> Frames:
+    """What compression does to colours, and nothing else of it."""
+    coded = []
+    for frame in frames:
+        brightness, *hues = cv2.split(cv2.cvtColor(frame, cv2.COLOR_RGB2YCrCb))
+        size = brightness.shape[::-1]
+        coarse = [
+            cv2.resize(cv2.resize(h, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), size) for h in hues
+        ]
+        coded.append(cv2.cvtColor(cv2.merge([brightness, *coarse]), cv2.COLOR_YCrCb2RGB))
+    return np.stack(coded)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_coarse_hues_are_no_things_but_a_dark_finger_is_one(seed: int) -> None:
+    task = task_of("slide_lift", seed=seed)
+    camera = Camera(size=50, scale=4e-3)
+    frames = render(task.body.vertices, task.trajectory.poses, camera)
+    plain, coarse = (separate(f, camera, floor=True).foreign for f in (frames, hues_of_half_size(frames)))
+    assert coarse.mean() < plain.mean() + 0.02  # a ring of two pixels around the object is .08 of the picture
+    hand = frames.copy()
+    for t in range(len(hand)):
+        hand[t, 5:8, 20 + 4 * t : 23 + 4 * t] = 40
+    hidden = separate(hues_of_half_size(hand), camera, floor=True).foreign[:, ::-1]  # rows from the top
+    for t in range(len(hand)):
+        assert hidden[t, 4:9, 19 + 4 * t : 24 + 4 * t].all()
+
+
+def test_a_piece_counts_as_a_whole_but_not_through_time() -> None:
     masks = np.zeros((2, 12, 12), dtype=bool)
-    masks[0, 2, 2:7] = True  # five
-    masks[0, 6:9, 6:8] = True  # six
-    masks[1, 2:4, 2:5] = True  # six, next to the five of the frame before
-    kept = _things(masks)
-    assert not kept[0, 2].any()
-    assert kept[0, 6:9, 6:8].all()
-    assert kept[1].sum() == 6
+    masks[0, 2, 2:7] = masks[0, 6:9, 6:8] = masks[1, 2, 2:7] = True
+    cores = np.zeros_like(masks)
+    cores[0, 2, 3] = cores[1, 11, 11] = True
+    kept = _around(cores, masks)
+    assert kept[0, 2, 2:7].all()
+    assert kept.sum() == 5
