@@ -6,7 +6,7 @@ A stage can be stopped at any moment; continued from its last checkpoint it take
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -58,7 +58,12 @@ class Training:
     def iterate(self) -> float:
         """One pass over the tasks in random order; the mean loss."""
         self.policy.train()
-        losses = [self._descend(self.tasks[rows]) for rows in self._batches()]
+        losses = []
+        batches = self._batches()
+        for k, rows in enumerate(batches):
+            rate = self.schedule.rate((self.iteration + k / len(batches)) / self.schedule.iterations)
+            self.optimiser.param_groups[0]["lr"] = rate
+            losses.append(self._descend(self.tasks[rows]))
         self.iteration += 1
         return sum(losses) / len(losses)
 
@@ -123,7 +128,7 @@ def fit(training: Training, record: Record, *, watch: Watch, resume: bool) -> No
     curves = path.parent / "tensorboard" / title
     with seeded(training.schedule.seed):
         if resume and path.exists():
-            training.restore(checked(record, training.tasks), record)
+            training.restore(checked(record, training), record)
         else:
             shutil.rmtree(curves, ignore_errors=True)
         with SummaryWriter(str(curves), purge_step=training.iteration + 1) as writer:
@@ -155,19 +160,21 @@ def _iterations(training: Training, title: str) -> Iterator[float]:
             show(training.iteration, f"{title} {loss:.3g}")
 
 
-def checked(record: Record, tasks: TaskBatch) -> Checkpoint:
+def checked(record: Record, training: Training) -> Checkpoint:
     """The checkpoint that this very training may continue.  Raises InvalidProblem where data or settings have changed."""
     path, stage = record.path, record.stage
     saved = load(path, command=f"python train.py stage={stage.name}")
     again = "resume=false trains from the start"
-    if saved.about.data != tasks.fingerprint:
+    if saved.about.data != training.tasks.fingerprint:
         raise InvalidProblem(
             f"checkpoint {path}",
             expected="the data that it was trained on",
             got=f"data set {stage.dataset} with other contents",
             remedy=again,
         )
-    if name := _first_difference(saved.about.settings, record.settings):
+    decays = training.schedule.decay != "constant"  # then steps depend on how many there are to be
+    free = FREE_TO_CHANGE[1:] if decays else FREE_TO_CHANGE
+    if name := _first_difference(saved.about.settings, record.settings, free):
         raise InvalidProblem(
             f"checkpoint {path}", expected="the same settings", got=f"another {name}", remedy=again
         )
@@ -175,16 +182,19 @@ def checked(record: Record, tasks: TaskBatch) -> Checkpoint:
 
 
 FREE_TO_CHANGE = ("schedule.iterations", "schedule.log_every", "schedule.save_every")
+"""Settings that leave the steps alone."""
 
 
-def _first_difference(a: Mapping[str, object], b: Mapping[str, object], prefix: str = "") -> str | None:
-    """Name of the first setting that differs, apart from those that leave the steps alone."""
+def _first_difference(
+    a: Mapping[str, object], b: Mapping[str, object], free: Sequence[str], prefix: str = ""
+) -> str | None:
+    """Name of the first setting that differs, apart from those that are free to."""
     for key in sorted({*a, *b}):
         name, x, y = prefix + key, a.get(key), b.get(key)
         if isinstance(x, Mapping) and isinstance(y, Mapping):
-            if found := _first_difference(x, y, f"{name}."):
+            if found := _first_difference(x, y, free, f"{name}."):
                 return found
-        elif x != y and name not in FREE_TO_CHANGE:
+        elif x != y and name not in free:
             return name
     return None
 

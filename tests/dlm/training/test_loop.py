@@ -1,5 +1,6 @@
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
@@ -47,13 +48,12 @@ def train(
     watch: Watch = QUIET,
     seed: int = 3,
     settings: dict[str, object] | None = None,
-    **schedule: float,
+    **schedule: float | str,
 ) -> list[Row]:
     policy = MODEL.build("program", program, seed=seed)
     policy.fit_centre(tasks)
-    plan = Schedule(
-        seed=seed, **{"iterations": 6, "batch_size": 2, "save_every": 2, "log_every": 1, **schedule}
-    )
+    every: dict[str, Any] = {"iterations": 6, "batch_size": 2, "save_every": 2, "log_every": 1, **schedule}
+    plan = Schedule(seed=seed, **every)
     training = Training(policy, STAGE.loss, tasks, plan)
     record = Record(path=path, stage=STAGE, model="thesis", settings=settings or {})
     fit(training, record, watch=watch, resume=resume)
@@ -77,12 +77,12 @@ def test_training_leaves_the_callers_random_numbers_alone(
     assert torch.equal(torch.get_rng_state(), before)
 
 
-@pytest.mark.parametrize("stop_at", [1, 3, 4])
+@pytest.mark.parametrize(("stop_at", "decay"), [(1, "constant"), (3, "cosine"), (4, "constant")])
 def test_a_killed_stage_resumes_to_the_losses_and_weights_of_an_undisturbed_one(
-    tasks: TaskBatch, program: InverseDynamics, tmp_path: Path, stop_at: int
+    tasks: TaskBatch, program: InverseDynamics, tmp_path: Path, stop_at: int, decay: str
 ) -> None:
     whole, broken = tmp_path / "whole.safetensors", tmp_path / "broken.safetensors"
-    undisturbed = train(tasks, program, whole)
+    undisturbed = train(tasks, program, whole, decay=decay)
     seen = []
 
     def stop(policy: Policy) -> Row:
@@ -92,8 +92,8 @@ def test_a_killed_stage_resumes_to_the_losses_and_weights_of_an_undisturbed_one(
         return {}
 
     with pytest.raises(Interrupted):
-        train(tasks, program, broken, watch=Watch(measure=stop, picture=QUIET.picture))
-    assert train(tasks, program, broken, resume=True) == undisturbed
+        train(tasks, program, broken, watch=Watch(measure=stop, picture=QUIET.picture), decay=decay)
+    assert train(tasks, program, broken, resume=True, decay=decay) == undisturbed
     a, b = load(whole, command=""), load(broken, command="")
     assert all(torch.equal(a.model[k], b.model[k]) for k in a.model)
     assert all(torch.equal(a.optimiser[k], b.optimiser[k]) for k in a.optimiser)
@@ -110,6 +110,27 @@ def test_resuming_a_finished_stage_changes_nothing_and_more_iterations_go_on(
     assert all(torch.equal(before.model[k], after.model[k]) for k in before.model)
     longer = train(tasks, program, path, iterations=6, resume=True)
     assert longer == train(tasks, program, tmp_path / "whole.safetensors", iterations=6)
+
+
+def test_a_decaying_stage_takes_smaller_and_smaller_steps_and_cannot_be_prolonged(
+    tasks: TaskBatch, program: InverseDynamics, tmp_path: Path
+) -> None:
+    policy = MODEL.build("program", program, seed=0)
+    policy.fit_centre(tasks)
+    plan = Schedule(iterations=4, batch_size=2, learning_rate=1e-3, decay="cosine")
+    training = Training(policy, STAGE.loss, tasks, plan)
+    moves = []
+    for _ in range(4):
+        before = torch.cat([p.detach().flatten() for p in policy.parameters()])
+        training.iterate()
+        after = torch.cat([p.detach().flatten() for p in policy.parameters()])
+        moves.append(float((after - before).abs().max()))
+    assert moves[3] < 0.2 * moves[0]
+    path, settings = tmp_path / "mdr.safetensors", {"schedule": {"iterations": 2, "decay": "cosine"}}
+    train(tasks, program, path, iterations=2, decay="cosine", settings=dict(settings))
+    longer: dict[str, object] = {"schedule": {"iterations": 3, "decay": "cosine"}}
+    with pytest.raises(InvalidProblem, match=r"another schedule\.iterations"):
+        train(tasks, program, path, iterations=3, decay="cosine", settings=longer, resume=True)
 
 
 def test_four_tasks_are_learnt_by_heart_without_dropout(tasks: TaskBatch) -> None:
