@@ -50,7 +50,7 @@ class Training:
             len(tasks) >= 2, "dataset", "at least 2 tasks to train on", len(tasks), "generate a larger one"
         )
         self.policy, self.loss, self.tasks, self.schedule = policy, loss, tasks, schedule
-        self.optimiser = torch.optim.Adam(policy.parameters(), lr=schedule.learning_rate)
+        self.optimiser = torch.optim.Adam(policy.parameters(), lr=schedule.learning_rate, fused=True)
         self.iteration = 0
         self.history: list[Row] = []
         self.seconds = 0.0
