@@ -28,6 +28,10 @@ class Geometry:
     count: Tensor
     poses: Tensor
 
+    def __getitem__(self, rows: Tensor) -> "Geometry":
+        """Some of the tasks, by number."""
+        return Geometry(vertices=self.vertices[rows], count=self.count[rows], poses=self.poses[rows])
+
     @property
     def present(self) -> Tensor:
         """Mask (b, f) of the facets that count."""

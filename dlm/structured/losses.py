@@ -19,7 +19,7 @@ from dlm.structured.calibration import Calibration
 from dlm.structured.classes import Schedules
 from dlm.structured.examples import Example
 from dlm.structured.policies import ProposalPolicy
-from dlm.structured.scorer import Scorer, stack
+from dlm.structured.scorer import Ranker, stack
 from dlm.tasks import TaskBatch
 from expert.contact.fixed_modes import costs_at_modes
 from expert.errors import InvalidProblem
@@ -55,7 +55,7 @@ class ClassLoss:
         return class_distance(scorer, examples)
 
 
-def class_distance(scorer: Scorer, examples: list[Example]) -> Tensor:
+def class_distance(scorer: Ranker, examples: list[Example]) -> Tensor:
     """Mean cross-entropy over the examples whose class the vocabulary has; 0 if there is none."""
     known = [(e, c) for e in examples if (c := e.contact_class(scorer.schedules)) is not None]
     if not known:
@@ -83,7 +83,7 @@ class CheckedClassLoss:
         regrets = [self._regret(scorer, s, logits[k], tasks.fingerprint) for k, s in enumerate(tasks.samples)]
         return self.classes(policy, tasks) + self.regret_weight * torch.stack(regrets).mean()
 
-    def _regret(self, scorer: Scorer, sample: Sample, logits: Tensor, fingerprint: str) -> Tensor:
+    def _regret(self, scorer: Ranker, sample: Sample, logits: Tensor, fingerprint: str) -> Tensor:
         key = hash((fingerprint, sample.index))
         if key not in self.known:
             self.known[key] = np.log1p(regrets(sample, scorer.schedules))

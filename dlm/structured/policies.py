@@ -20,7 +20,7 @@ from dlm.structured.classes import MEASURED, Schedules
 from dlm.structured.model import Planned, StructuredModel
 from dlm.structured.planners import ClassPlanner
 from dlm.structured.planning import Planning
-from dlm.structured.scorer import Encoder, Scorer, stack
+from dlm.structured.scorer import Encoder, Ranker, Scorer, stack
 from expert.errors import InvalidProblem
 from expert.problems.contact import ContactTask
 from expert.world.values import IntArray, require
@@ -69,7 +69,7 @@ class ProposalPolicy(Policy):
     knobs: the calibration, in units of `calibration.UNITS`.
     """
 
-    def __init__(self, scorer: Scorer, model: StructuredModel, widths: tuple[int, ...], widen: bool) -> None:
+    def __init__(self, scorer: Ranker, model: StructuredModel, widths: tuple[int, ...], widen: bool) -> None:
         super().__init__()
         self.scorer, self.widths, self.widen = scorer, widths, widen
         self.knobs = nn.Parameter(torch.zeros(len(NAMES), dtype=torch.float64))
@@ -193,9 +193,9 @@ class StructuredArchitecture:
         encoder = Encoder(steps=steps, width=self.width, layers=self.layers, heads=self.heads)
         return RegressorPolicy(encoder, self.model(), self.width)
 
-    def proposer(self, kind: PolicyKind = "proposals") -> ProposalPolicy:
-        """MDR (best_guess: one class, no second chance), CVX and DLM (proposals)."""
-        scorer = Scorer(
+    def ranker(self, network: type[Ranker] = Scorer) -> Ranker:
+        """The network that ranks contact classes."""
+        return network(
             Schedules(tuple(self.schedules)),
             tasks=self.planning.tasks,
             steps=self.planning.tasks.steps,
@@ -203,5 +203,8 @@ class StructuredArchitecture:
             layers=self.layers,
             heads=self.heads,
         )
+
+    def proposer(self, kind: PolicyKind = "proposals") -> ProposalPolicy:
+        """MDR (best_guess: one class, no second chance), CVX and DLM (proposals)."""
         guess = kind == "best_guess"
-        return ProposalPolicy(scorer, self.model(), (1,) if guess else self.widths, widen=not guess)
+        return ProposalPolicy(self.ranker(), self.model(), (1,) if guess else self.widths, widen=not guess)

@@ -1,6 +1,7 @@
 """The scorer: how likely is each contact class the best one?  A transformer over facets and steps, a perceptron over pairs."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import torch
@@ -53,7 +54,7 @@ def _embedding(numbers: int, width: int) -> nn.Module:
     return nn.Sequential(nn.Linear(numbers, width), nn.ReLU(), nn.Linear(width, width))
 
 
-class Scorer(nn.Module):
+class Ranker(nn.Module):
     """Logits (b, s, f, f) of all classes (schedule, facet of the first finger, facet of the second); -inf where there is none."""
 
     def __init__(
@@ -69,15 +70,14 @@ class Scorer(nn.Module):
         super().__init__()
         self.schedules, self.tasks = schedules, tasks or TaskSettings()
         self.encoder = Encoder(steps=steps, width=width, layers=layers, heads=heads)
-        self.first, self.second, self.whole = (nn.Linear(width, width) for _ in range(3))
-        self.pair = nn.Sequential(
-            nn.ReLU(), nn.Linear(width, width), nn.ReLU(), nn.Linear(width, len(schedules))
-        )
+
+    def pairs(self, facets: Tensor, whole: Tensor, present: Tensor) -> Tensor:
+        """Logits (b, s, f, f) of all pairs, from tokens (b, f, width) of the facets, of which some are present (b, f), and (b, width) of the motion."""
+        raise NotImplementedError
 
     def forward(self, g: Geometry) -> Tensor:
         facets, steps = self.encoder(g, self.tasks)
-        pairs = self.first(facets)[:, :, None] + self.second(facets)[:, None]
-        logits = self.pair(pairs + self.whole(steps.mean(1))[:, None, None]).permute(0, 3, 1, 2)
+        logits = self.pairs(facets, steps.mean(1), g.present)
         same = torch.from_numpy(self.schedules.symmetric)[:, None, None]
         logits = torch.where(same, logits + logits.transpose(2, 3), logits)
         return logits.masked_fill(~self._classes(g), -torch.inf)
@@ -96,3 +96,18 @@ class Scorer(nn.Module):
         classes = self.schedules.classes(len(vertices))
         scores = logits[tuple(torch.from_numpy(classes).T)].numpy()
         return classes[np.argsort(-scores, kind="stable")]
+
+
+class Scorer(Ranker):
+    """A perceptron over pairs of facets."""
+
+    def __init__(self, schedules: Schedules, *, width: int = 96, **sizes: Any) -> None:
+        super().__init__(schedules, width=width, **sizes)
+        self.first, self.second, self.whole = (nn.Linear(width, width) for _ in range(3))
+        self.pair = nn.Sequential(
+            nn.ReLU(), nn.Linear(width, width), nn.ReLU(), nn.Linear(width, len(schedules))
+        )
+
+    def pairs(self, facets: Tensor, whole: Tensor, present: Tensor) -> Tensor:
+        both = self.first(facets)[:, :, None] + self.second(facets)[:, None]
+        return self.pair(both + self.whole(whole)[:, None, None]).permute(0, 3, 1, 2)
