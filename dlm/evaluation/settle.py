@@ -10,9 +10,12 @@ from torch import nn
 from dlm.policy import Policy
 from dlm.tasks import TaskBatch
 
+ENOUGH = 2000
+"""Tasks over which statistics are taken, of larger data sets the first so many."""
+
 
 def settle(policy: Policy, tasks: TaskBatch) -> None:
-    """Replace running averages by the statistics over one pass of all tasks that the policy learned from, without dropout."""
+    """Replace running averages by the statistics over one pass of (ENOUGH of) the tasks that the policy learned from, without dropout."""
     norms = [m for m in policy.modules() if isinstance(m, nn.BatchNorm1d)]
     if not norms:
         return
@@ -24,5 +27,5 @@ def settle(policy: Policy, tasks: TaskBatch) -> None:
         if isinstance(module, nn.Dropout):
             module.eval()
     with torch.no_grad():
-        policy(tasks.video)
+        policy(tasks.video[:ENOUGH])
     policy.eval()

@@ -16,7 +16,7 @@ from dlm.evaluation.report import Example, Report
 from dlm.evaluation.significance import Comparison, compare_all
 from dlm.evaluation.table import Cell, Line, Table
 from dlm.evaluation.timing import backward_seconds, expert_seconds, forward_seconds
-from dlm.evaluation.trained import Trained
+from dlm.evaluation.trained import Trained, title_of
 from dlm.execution import expert_action, idle_action
 from dlm.inverse_dynamics.layer import Action
 from dlm.simulator import SimulatorSettings
@@ -27,8 +27,8 @@ Seconds = tuple[float | None, float | None]
 """Forward and backward, per task."""
 
 IDLE, ORACLE = "no action", "MIQP (oracle)"
-CROSSWISE = (("NN", "MDR"), ("NNM", "DLM"))
-"""Compared beside every stage and the one that it starts from: networks alone and with the program."""
+CROSSWISE = (("NN", "MDR"), ("NNM", "DLM"), ("CVX longer", "DLM"))
+"""Compared beside every stage and the one that it starts from: networks alone and with the program, labels and simulation."""
 
 TIMED = 20
 """Tasks of the batch on which backward passes are timed, as many as the thesis trains on."""
@@ -105,7 +105,7 @@ class Study:
         }
         stages = [(one.stage.warm_start, one.stage.name) for one in self.trained if one.stage.warm_start]
         pairs = [
-            *((before.upper(), after.upper()) for before, after in stages),
+            *((title_of(before), title_of(after)) for before, after in stages),
             *CROSSWISE,
             *((IDLE, title) for title in outcomes if title not in (IDLE, ORACLE)),
         ]

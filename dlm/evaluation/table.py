@@ -13,6 +13,8 @@ from dlm.evaluation.significance import Comparison
 
 DATASETS = {"train": "train", "finetune": "fine-tune", "test": "test", "family": "family"}
 """Columns and their headings."""
+CLIP = 10.0
+"""Largest loss of a single task that counts in full [cm^2]; doing nothing costs about 1."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +22,7 @@ class Cell:
     """One architecture on one data set; means over tasks, then over seeds.
 
     loss, median: object-trajectory loss [cm^2]; spread: its standard deviation over seeds; ratio: to the loss of no action.
+    clipped: that ratio with no single loss above CLIP, so that one object that is flung away does not outweigh all others.
     finger_loss [cm^2]: none where the fingers wait on purpose.  rms_mm, rms_deg: errors over the motion.
     within: share of tasks that end within 2 mm and 2 deg.  dropped, unsolved: per seed, the tasks in which the object ended
     too low, and those whose program was not solved.
@@ -30,6 +33,7 @@ class Cell:
     spread: float
     median: float
     ratio: float
+    clipped: float
     finger_loss: float | None
     rms_mm: float
     rms_deg: float
@@ -49,6 +53,7 @@ class Cell:
             spread=float(np.std(losses, ddof=1)) if len(losses) > 1 else 0.0,
             median=float(np.median([o.object_loss for o in outcomes])),
             ratio=float(np.mean(losses) / idle.object_loss.mean()),
+            clipped=_clipped(outcomes) / _clipped([idle]),
             finger_loss=None if waiting else float(np.mean([o.finger_loss.mean() for o in outcomes])),
             rms_mm=float(rms_mm),
             rms_deg=float(rms_deg),
@@ -56,6 +61,10 @@ class Cell:
             dropped=[np.flatnonzero(o.dropped).tolist() for o in outcomes],
             unsolved=[np.flatnonzero(~o.solved).tolist() for o in outcomes],
         )
+
+
+def _clipped(outcomes: Sequence[Outcome]) -> float:
+    return float(np.mean([np.minimum(o.object_loss, CLIP).mean() for o in outcomes]))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,6 +207,7 @@ def _p(value: float) -> str:
 
 DETAILS = {
     "ratio": "Loss / loss of no action",
+    "clipped": "Loss / loss of no action, single losses cut at 10 cm²",
     "median": "Median loss [cm²]",
     "within": "Share of tasks that end within 2 mm and 2°",
     "rms": "RMS error over the motion [mm, °]",
@@ -216,6 +226,7 @@ def _detail(cell: Cell, kind: str) -> str:
     drops, unsolved = (sum(map(len, lists)) / seeds for lists in (cell.dropped, cell.unsolved))
     return {
         "ratio": _number(cell.ratio),
+        "clipped": _number(cell.clipped),
         "median": _number(cell.median),
         "within": f"{cell.within:.3f}",
         "rms": f"{_short(cell.rms_mm)}, {_short(cell.rms_deg)}",

@@ -28,13 +28,19 @@ class Trained:
     @property
     def title(self) -> str:
         """As in the table."""
-        return self.stage.name.upper()
+        return title_of(self.stage.name)
 
     def settled(self, tasks: Mapping[str, TaskBatch]) -> "Trained":
         """Batch norm's statistics taken anew, over the tasks that the stage learned from."""
         for policy in self.policies:
             settle(policy, tasks[self.stage.dataset])
         return self
+
+
+def title_of(stage: str) -> str:
+    """What a stage is called: NN for nn, CVX longer for cvx_longer."""
+    name, _, variant = stage.partition("_")
+    return " ".join(filter(None, (name.upper(), variant.replace("_", " "))))
 
 
 def read_trained(output: str | Path, stage: str, seeds: Sequence[int], build: Build) -> Trained:

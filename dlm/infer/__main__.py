@@ -15,6 +15,7 @@ from dlm.infer.clip import VideoFile
 from dlm.infer.drawing import draw_inference
 from dlm.infer.inference import Given, Inference, infer
 from dlm.infer.segmentation import Segmentation
+from dlm.neural import weights as neural
 from dlm.structured import StructuredModel
 from dlm.structured.weights import SHIPPED, trained_model
 from expert.files.document import encoded
@@ -30,7 +31,7 @@ def main(cfg: DictConfig) -> None:
     file = VideoFile(path=cfg.video, start=cfg.start, end=cfg.end, rate=cfg.rate)
     given = Given(**{field.name: cfg[field.name] for field in fields(Given)})
     told = Segmentation(colour=cfg.colour, background=cfg.background, tolerance=cfg.tolerance)
-    model = chosen_model(cfg.checkpoint)
+    model = chosen_model(cfg.model, cfg.checkpoint)
     place = Path(cfg.out or Path("outputs") / "infer" / Path(cfg.video).stem) / swept("video", "out")
     require(not place.exists() or place.is_dir(), "out", "a folder", f"{place}, a file")
     with folder(place), Output(place / "actions.json") as actions:
@@ -46,8 +47,11 @@ def main(cfg: DictConfig) -> None:
         sys.exit(NO_PLAN)
 
 
-def chosen_model(checkpoint: str | None) -> StructuredModel | None:
+def chosen_model(name: str, checkpoint: str | None) -> StructuredModel | None:
     """The model with the given weights; None: the default one."""
+    require(name in ("structured", "neural"), "model", "structured or neural", name)
+    if name == "neural":
+        return neural.shipped() if checkpoint in (None, "shipped") else neural.trained(Path(checkpoint))
     if checkpoint is None:
         return None
     return trained_model(SHIPPED if checkpoint == "shipped" else Path(checkpoint))

@@ -18,15 +18,23 @@ SHIPPED = Path(__file__).with_name("weights.safetensors")
 COMMAND = "python train.py experiment=large"
 
 
-def trained_model(path: Path, *, best_guess: bool = False, trial: Trial | None = None) -> StructuredModel:
-    """The model with the scorer and the calibration of a checkpoint of a stage with proposals.
+def trained_model(
+    path: Path,
+    *,
+    architecture: StructuredArchitecture | None = None,
+    best_guess: bool = False,
+    trial: Trial | None = None,
+    command: str = COMMAND,
+) -> StructuredModel:
+    """The model with the network and the calibration of a checkpoint of a stage with proposals.
 
-    best_guess: check the likeliest class alone.  trial: what plans must survive.  Raises InvalidProblem for a missing or
-    damaged file, and for weights of another model.
+    architecture: as it was trained, by default `model: structured`.  best_guess: check the likeliest class alone.
+    trial: what plans must survive.  command: what makes such files.  Raises InvalidProblem for a missing or damaged file, and
+    for weights of another model.
     """
-    architecture = StructuredArchitecture()
+    architecture = architecture or StructuredArchitecture()
     policy = architecture.proposer("best_guess" if best_guess else "proposals")
-    restore_weights(policy.weights(), load(path, command=COMMAND), name=architecture.name, source=path)
+    restore_weights(policy.weights(), load(path, command=command), name=architecture.name, source=path)
     policy.eval()
     model = policy.model
     return replace(model, planner=replace(policy.planner, trial=trial))

@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.table import Table
 
 from dlm.evaluation.outcomes import Outcome, act, execute
-from dlm.evaluation.settle import settle
+from dlm.evaluation.settle import ENOUGH, settle
 from dlm.evaluation.trained import read_trained
 from dlm.execution import idle_action
 from dlm.policy import Policy
@@ -33,8 +33,6 @@ ROOT = Path(__file__).resolve().parents[2]
 BATCH, STEPS = 20, 1000
 STAGES = {"thesis": ("nn", "mdr", "cvx"), "structured": ("mdr",)}
 """Stages that learn from labels.  CVX starts from MDR, takes half as many steps, and smaller ones."""
-SETTLING = 2000
-"""Most tasks that statistics are taken over."""
 SETS = {"test": "data/test-seed0", "family": "data/family-seed0"}
 QUICK = {"test": "data/smoke-seed0"}
 TITLES = {("structured", "mdr"): "structured, one class", ("structured", "8"): "structured, 8 checked"}
@@ -86,7 +84,7 @@ def policies(model: str, size: int, options: argparse.Namespace) -> dict[str, Po
     found: dict[str, Policy] = {}
     seen = None
     if model == "thesis" and options.batch_norm == "settled":
-        seen = TaskBatch.read(options.train, min(size, SETTLING))
+        seen = TaskBatch.read(options.train, min(size, ENOUGH))
     for stage in STAGES[model]:
         policy = read_trained(folder(model, size, options), stage, [0], build).policies[0]
         if seen is not None:

@@ -1,3 +1,4 @@
+import pytest
 import torch
 from torch import nn
 
@@ -70,3 +71,13 @@ def test_settling_twice_changes_nothing_more(tasks: TaskBatch) -> None:
     once = answer(policy, tasks)
     settle(policy, tasks)
     torch.testing.assert_close(answer(policy, tasks), once)
+
+
+def test_of_a_large_data_set_the_first_tasks_are_enough(
+    tasks: TaskBatch, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    policy = trained(tasks)
+    counts = rows_seen(policy)
+    monkeypatch.setattr("dlm.evaluation.settle.ENOUGH", 3)
+    settle(policy, tasks)
+    assert {3, 3 * tasks.video.shape[1]} >= set(counts.values())

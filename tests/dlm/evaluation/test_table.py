@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from dlm.evaluation.outcomes import execute
-from dlm.evaluation.table import Cell, Line, Table
+from dlm.evaluation.table import CLIP, Cell, Line, Table
 from dlm.execution import idle_action
 from dlm.tasks import TaskBatch
 from tests.support.outcomes import RIGID, outcome
@@ -19,6 +19,15 @@ def test_cells_average_over_tasks_and_seeds(tasks: TaskBatch) -> None:
     assert cell.dropped == [[], [0, 1, 2, 3]]
     assert cell.finger_loss == 0
     assert Cell.of([idle], idle).finger_loss is None
+
+
+def test_one_object_that_is_flung_away_counts_no_more_than_the_clip(tasks: TaskBatch) -> None:
+    idle = execute(idle_action(tasks), tasks, RIGID)
+    flung = outcome(tasks, x=1.0)
+    assert flung.object_loss.min() > 100
+    assert Cell.of([flung], idle).clipped == pytest.approx(CLIP / idle.object_loss.mean())
+    near = outcome(tasks, x=0.03)
+    assert Cell.of([near], idle).clipped == pytest.approx(Cell.of([near], idle).ratio)
 
 
 def test_markdown_shows_every_number_with_its_spread(tasks: TaskBatch) -> None:

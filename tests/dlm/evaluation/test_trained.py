@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 import torch
 
-from dlm.evaluation.trained import read_trained
+from dlm.evaluation.trained import read_trained, title_of
 from dlm.inverse_dynamics.layer import InverseDynamics
 from dlm.inverse_dynamics.parameters import Layout
 from dlm.tasks import TaskBatch
@@ -59,3 +59,7 @@ def test_a_checkpoint_of_another_stage_or_none_is_refused(tasks: TaskBatch, tmp_
         read_trained(tmp_path, "mdr", [1], MADE.__getitem__)
     with pytest.raises(InvalidProblem, match=r"python train\.py stage=nn seed=1"):
         read_trained(tmp_path, "nn", [1], MADE.__getitem__)
+
+
+def test_variants_of_a_stage_are_told_apart_in_words() -> None:
+    assert [title_of(name) for name in ("nn", "cvx_longer")] == ["NN", "CVX longer"]
