@@ -8,10 +8,11 @@ import torch
 from torch import Tensor, nn
 
 from dlm.inverse_dynamics.layer import Action, InverseDynamics
+from dlm.inverse_dynamics.parameters import ParameterBatch
 from dlm.tasks import TaskBatch
 
 PolicyKind = Literal["perceptron", "program", "regressor", "best_guess", "proposals"]
-"""The first two belong to `model: thesis`, the others to `model: structured`."""
+"""The first two belong to `model: thesis`, the last three to `model: structured`, all but perceptron and best_guess to `model: neural`."""
 
 
 class Policy(nn.Module):
@@ -19,6 +20,10 @@ class Policy(nn.Module):
 
     def fit_centre(self, tasks: TaskBatch) -> None:
         """Let the untrained policy answer with the average task of a training set, where it learns deviations from it."""
+
+    def derender(self, video: Tensor) -> ParameterBatch | None:
+        """Mechanical parameters of every video, as the program is given them; None where a policy has none."""
+        return None
 
     def weights(self) -> dict[str, Tensor]:
         """What was learned, and what it was scaled by; the constants of a program are neither."""

@@ -19,7 +19,7 @@ HYDRA = {
     "dlm.control": "control",
 }
 """Commands that read their options from configs/<name>.yaml."""
-BARE = {"dlm.structured.weights"}
+BARE = {"dlm.structured.weights", "dlm.neural.weights"}
 """Commands without a parser: they take one file."""
 ELSEWHERE = "examples/"
 """Run by tests of their own."""

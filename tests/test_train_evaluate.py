@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 import torch
+from hydra.utils import instantiate
 from omegaconf import DictConfig
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
@@ -356,3 +357,30 @@ def test_every_configuration_composes_without_gaps(
     configuration = composed(command, *[choice] if choice else [])
     plain = OmegaConf.to_container(configuration, resolve=True, throw_on_missing=True)
     assert {"seed", "seeds", "video"} & set(plain)
+
+
+def test_the_large_comparison_has_every_stage_and_a_control_that_differs_from_dlm_in_its_loss_alone(
+    composed: Callable[..., DictConfig],
+) -> None:
+    cfg = composed("train", "experiment=table_4_1_large")
+    stages = {name: instantiate(stage, _convert_="object") for name, stage in cfg.stages.items()}
+    assert list(stages) == ["mdr", "cvx", "dlm", "cvx_longer", "nn", "nnm"]
+    assert all(stage.name == name for name, stage in stages.items())
+    common = instantiate(cfg.schedule)
+    dlm, control = stages["dlm"], stages["cvx_longer"]
+    assert (dlm.dataset, dlm.warm_start) == (control.dataset, control.warm_start) == ("finetune", "cvx")
+    assert dlm.scheduled(common) == control.scheduled(common)
+    assert control.loss == stages["cvx"].loss
+    assert {stage.scheduled(common).decay for stage in stages.values()} == {"cosine"}
+    assert cfg.model.sizes.dropout == 0
+
+
+@pytest.mark.parametrize("stage", ["mdr", "cvx", "dlm", "nn", "nnm"])
+def test_every_stage_of_the_neural_model_fits_its_policies(
+    composed: Callable[..., DictConfig], stage: str
+) -> None:
+    cfg = composed("train", "experiment=neural")
+    built = instantiate(cfg.stages[stage], _convert_="object")
+    policy = instantiate(cfg.model, _convert_="object").build(built.policy, seed=0)
+    assert policy.weights()
+    assert built.warm_start is None or built.warm_start in cfg.stages

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import matplotlib
 import numpy as np
+import torch
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -11,7 +12,6 @@ from dlm.evaluation.outcomes import Outcome
 from dlm.inverse_dynamics.parameters import ParameterBatch
 from dlm.policy import Policy
 from dlm.tasks import TaskBatch
-from dlm.thesis.policies import ProgramPolicy
 from expert.geometry.pose import Array, to_world
 
 FINGER_COLOURS = ("tab:red", "tab:blue", "tab:purple", "tab:green")
@@ -23,11 +23,10 @@ ARROW = 0.03
 
 
 def derendered(policy: Policy, tasks: TaskBatch) -> ParameterBatch | None:
-    """P* of a policy that learns to derender."""
-    if not isinstance(policy, ProgramPolicy):
-        return None
+    """P* of a policy that derenders."""
     policy.eval()
-    return policy.derenderer.parameters_of(tasks.video).map(lambda x: x.detach())
+    with torch.no_grad():
+        return policy.derender(tasks.video)
 
 
 def task_figure(

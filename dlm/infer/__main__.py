@@ -31,7 +31,7 @@ def main(cfg: DictConfig) -> None:
     file = VideoFile(path=cfg.video, start=cfg.start, end=cfg.end, rate=cfg.rate)
     given = Given(**{field.name: cfg[field.name] for field in fields(Given)})
     told = Segmentation(colour=cfg.colour, background=cfg.background, tolerance=cfg.tolerance)
-    model = chosen_model(cfg.model, cfg.checkpoint)
+    model = chosen_model(cfg.model.name, cfg.checkpoint)
     place = Path(cfg.out or Path("outputs") / "infer" / Path(cfg.video).stem) / swept("video", "out")
     require(not place.exists() or place.is_dir(), "out", "a folder", f"{place}, a file")
     with folder(place), Output(place / "actions.json") as actions:

@@ -58,13 +58,21 @@ class PointerPolicy(ProposalPolicy):
         classes = torch.stack([s, rest // size, rest % size], -1)
         return classes.numpy(), best.values.log_softmax(1)
 
-    def derender(self, geometry: Geometry, classes: IntArray) -> ParameterBatch:
+    def derender(self, video: Tensor) -> ParameterBatch | None:
+        """P(t) with the likeliest classes; None where one of the videos shows no object."""
+        seen, _ = self.seen(video)
+        if len(seen) < len(video):
+            return None
+        geometry = geometry_of(seen)
+        return self.assembled(geometry, self.likeliest(geometry, 1)[0][:, 0])
+
+    def assembled(self, geometry: Geometry, classes: IntArray) -> ParameterBatch:
         """P(t) of tasks with their classes (b, 3), margins as they are calibrated."""
         return assemble(geometry, classes, self.scorer.schedules, self.scorer.tasks, self.margins())
 
     def act(self, geometry: Geometry, classes: IntArray) -> Action:
         """What the program makes of them; differentiable in the geometry and in the calibration."""
-        return solve(self.program, self.derender(geometry, classes), passes=self.passes)
+        return solve(self.program, self.assembled(geometry, classes), passes=self.passes)
 
     def margins(self) -> Margins:
         """What the calibration makes of the planner's margins."""

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from dlm.inverse_dynamics.layer import Action, InverseDynamics
-from dlm.inverse_dynamics.parameters import Layout
+from dlm.inverse_dynamics.parameters import Layout, ParameterBatch
 from dlm.policy import Policy, PolicyKind, seeded
 from dlm.tasks import TaskBatch
 from dlm.thesis.derender import Derenderer, NetworkSizes, perceptron
@@ -64,8 +64,11 @@ class ProgramPolicy(DerenderingPolicy):
         self.derenderer = Derenderer(layout, sizes)
         self.program = program
 
+    def derender(self, video: Tensor) -> ParameterBatch:
+        return self.derenderer.parameters_of(video)
+
     def forward(self, video: Tensor) -> Action:
-        return self.program(self.derenderer.parameters_of(video))
+        return self.program(self.derender(video))
 
 
 @dataclass(frozen=True, kw_only=True)
