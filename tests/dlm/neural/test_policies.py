@@ -106,7 +106,7 @@ def test_videos_without_an_object_are_unsolved_and_leave_the_others_alone(
     assert policy.derender(video) is None
     P = policy.derender(tasks.video)
     assert P is not None
-    torch.testing.assert_close(P.poses, tasks.poses, atol=5e-4, rtol=0.0)
+    torch.testing.assert_close(P.poses, tasks.poses, atol=1e-2, rtol=0.0)
 
 
 def test_the_expected_motion_weighs_classes_by_their_shares(
