@@ -117,10 +117,13 @@ class Study:
     ) -> Report:
         """What the page shows; `examples` animated tasks each of the family and test sets."""
         histories = {one.stage.name: [a.history for a in one.abouts] for one in self.trained}
-        idle = {name: float(row[0].object_loss.mean()) for name, row in outcomes[IDLE].items()}
+        idle, oracle = (
+            {name: float(row[0].object_loss.mean()) for name, row in outcomes[title].items()}
+            for title in (IDLE, ORACLE)
+        )
         return Report(
             table=table,
-            curves=curves_figure(histories, idle),
+            curves=curves_figure(histories, idle, oracle),
             qualitative=qualitative_figure(
                 [
                     (d, self.tasks[d], k, {t: row[d][0] for t, row in outcomes.items() if t != IDLE})
