@@ -50,7 +50,7 @@ def test_gradients_of_the_class_loss_agree_with_differences(tasks: TaskBatch) ->
 
 
 def test_the_calibration_s_gradient_points_away_from_the_bias(tasks: TaskBatch) -> None:
-    policy = StructuredArchitecture().proposer()
+    policy = StructuredArchitecture().build("proposals", seed=0)
     few = tasks[torch.arange(2)]
     with torch.no_grad():
         policy.knobs[0] = 4.0  # the camera is taken to be 4 mm to the right of where it is
@@ -63,7 +63,7 @@ def test_the_calibration_s_gradient_points_away_from_the_bias(tasks: TaskBatch) 
 
 
 def test_without_bias_calibration_leaves_everything_as_it_is(tasks: TaskBatch) -> None:
-    policy = StructuredArchitecture().proposer()
+    policy = StructuredArchitecture().build("proposals", seed=0)
     loss = CalibrationLoss(simulator=SimulatorSettings())(policy, tasks[torch.arange(2)])
     loss.backward()
     assert float(loss.detach()) < 1e-3
