@@ -1,11 +1,13 @@
 """Fingers for a goal cell: one small linear program per knot.  Knots only meet in the smoothness cost."""
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
+from expert.budget import UNLIMITED, Budget
 from expert.geometry.cover import clip
 from expert.geometry.polygon import signed_area
 from expert.geometry.pose import Array
@@ -39,23 +41,25 @@ class Candidate:
     firmest: float
 
 
-def cells(table: Facets, count: int, margin: float, least: float = LEAST_MOMENT) -> list[GoalCell]:
+def cells(
+    table: Facets, count: int, margin: float, least: float = LEAST_MOMENT, budget: Budget = UNLIMITED
+) -> Iterator[GoalCell]:
     """Facets and rays that may hold the object at the goal: moments of both senses of at least `least` are within reach.
 
     Where two fingers share a facet, changing places exchanges the rays: one order of these is enough.
     """
-    found = []
     for chosen in tuples(table, count):
+        if budget.over:
+            return
         reachable = _moments(table, chosen, margin)
         if count == 3:
             cell = GoalCell(table, chosen, 0, 0, margin, least=least)
             if cell.E[0] > 0 and reachable[0, 0] < 0 < reachable[0, 1]:
-                found.append(cell)
+                yield cell
             continue
         for up, down in ((0, 1), (1, 0)) if len(set(chosen)) == count else ((0, 1),):
             if reachable[up, 0] < -least and reachable[down, 1] > least:
-                found.append(GoalCell(table, chosen, up, down, margin, least=least))
-    return found
+                yield GoalCell(table, chosen, up, down, margin, least=least)
 
 
 def _moments(table: Facets, chosen: tuple[int, ...], margin: float) -> Array:

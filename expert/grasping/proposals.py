@@ -12,7 +12,7 @@ from expert.budget import Budget
 from expert.errors import InvalidProblem, SolverFailed
 from expert.geometry.polygon import signed_area
 from expert.geometry.pose import Array
-from expert.grasping.cell import GoalCell
+from expert.grasping.cell import LEAST_MOMENT, GoalCell
 from expert.grasping.decomposed import smooth_path, topologies
 from expert.grasping.facets import Facets
 from expert.grasping.goal_cell import (
@@ -107,8 +107,12 @@ class RelativeProblem:
 
     @cached_property
     def _ranked(self) -> list[GoalCell]:
-        known = self.table, self.problem.count, self.margin
-        return sorted(cells(*known) or cells(*known, SLIGHT_MOMENT), key=lambda c: -hold(c))
+        for least in (LEAST_MOMENT, SLIGHT_MOMENT):
+            found = cells(self.table, self.problem.count, self.margin, least, self.budget)
+            by_hold = [(hold(cell), cell) for cell in found]
+            if by_hold:
+                break
+        return [cell for _, cell in sorted(by_hold, key=lambda entry: -entry[0])]
 
     def cells(self) -> Iterator[tuple[GoalCell, Places]]:
         """Facets and rays, the firmest first, with every way to put labelled fingers there."""

@@ -43,7 +43,7 @@ def _cost(task: CageProblem, answer: CageSolution) -> str:
         if opening < -TOLERANCE * size:
             return f"the gripper opens by {opening:.4g} m"
         cost, scale = -opening, size
-    if not abs(cost - answer.objective) <= TOLERANCE * scale:
+    if not abs(cost - answer.objective) <= TOLERANCE * max(abs(cost), TOLERANCE * scale):
         return f"the cost is {cost:.6g}, not {answer.objective:.6g}"
     return ""
 

@@ -10,7 +10,7 @@ from expert.verify.grippers import direction_fault, opening_fault
 CLAIMED = ("method", "seconds", "refuted", "reason")
 """Fields of an answer that say how it was found: nothing here depends on them."""
 TOLERANCE = 1e-6
-"""Of a cost, relative to the square of the object's size."""
+"""Of a cost, relative to itself, and to what that share of the square of the object's size costs."""
 WORLD_X = 0.0
 """Direction [rad] along which parallel grippers open."""
 
@@ -31,6 +31,6 @@ def cost_fault(problem: GraspProblem, answer: GraspSolution) -> str:
         cost = float((np.diff(answer.path, 2, axis=0) ** 2).sum())
     else:
         cost = abs(signed_area(answer.starts)) if len(answer.starts) > 2 else 0.0
-    if abs(cost - answer.objective) <= TOLERANCE * problem.shape.size**2:
+    if abs(cost - answer.objective) <= TOLERANCE * max(cost, TOLERANCE * problem.shape.size**2):
         return ""
     return f"the cost is {cost:.6g}, not {answer.objective:.6g}"
