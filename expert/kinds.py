@@ -95,6 +95,28 @@ class CertifiedGrasp(Kind):
         draw(task, answer, path)
 
 
+class PushToGoal(Kind):
+    """Which straight pushes of one finger bring an object on a table to its goal?"""
+
+    solved = ("solved",)
+
+    def solve(self, task: Any, **options: Any) -> Any:
+        from expert.pushing.synthesis import solve
+
+        return solve(task, **options)
+
+    def verify(self, task: Any, answer: Any) -> Report:
+        from expert.verify.push.check import verify
+
+        return verify(task, answer)
+
+    def draw(self, task: Any, answer: Any, path: str | os.PathLike[str], view: str | None = None) -> None:
+        from expert.drawing.push import draw
+
+        _require_no(view)
+        draw(task, answer, path)
+
+
 def _require_no(view: str | None) -> None:
     if view:
         raise InvalidProblem("view", expected="none for this kind", got=view)
@@ -104,4 +126,5 @@ KINDS: dict[str, Kind] = {
     "contact_trajectory": ContactTrajectory(),
     "cage": Cage(),
     "certified_grasp": CertifiedGrasp(),
+    "push": PushToGoal(),
 }

@@ -4,7 +4,7 @@ import os
 from typing import Any, Protocol
 
 from expert.errors import InvalidProblem
-from expert.files import cage, certified_grasp, contact_trajectory
+from expert.files import cage, certified_grasp, contact_trajectory, push
 from expert.files.document import load, save
 from expert.files.problem import Problem, Solution
 from expert.files.section import Section
@@ -56,6 +56,7 @@ FORMATS: dict[str, Format] = {
     "contact_trajectory": contact_trajectory,
     "cage": cage,
     "certified_grasp": certified_grasp,
+    "push": push,
 }
 
 

@@ -16,11 +16,12 @@ SAME = 1e-6
 
 @dataclass(frozen=True)
 class Goal:
-    """Goal pose (3,) of a shape's frame moved to `origin` (2,), as `PushModel` has it."""
+    """Goal pose (3,) of a shape's frame moved to `origin` (2,), as `PushModel` has it; symmetric: or one that looks the same."""
 
     shape: Shape
     origin: Array
     pose: Array
+    symmetric: bool = True
 
     @cached_property
     def centroid(self) -> Array:
@@ -35,8 +36,8 @@ class Goal:
 
     @cached_property
     def poses(self) -> Array:
-        """Poses (G, 3) that look the same as the goal."""
-        turns = symmetries(self.shape)
+        """Poses (G, 3) that are the goal."""
+        turns = symmetries(self.shape) if self.symmetric else np.zeros(1)
         angles = self.pose[2] + turns
         centre = to_world(self.pose, self.centroid[None])[0]
         return np.column_stack([centre - self.centroid @ np.swapaxes(rotation(angles), -1, -2), angles])

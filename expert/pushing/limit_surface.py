@@ -18,12 +18,17 @@ from expert.world.values import require
 
 FREE, STICKING, SLIDING = 0, 1, 2
 ROUNDS = 60
+CLOSE = 1e-10
+"""Sine of the angle between a force and the one that is asked for."""
 ROUNDING = 1e-6
 """Speeds below this fraction of the contact's are smoothed, so that a pressure point at the centre of rotation has a slope."""
 
 
 class Surface(NamedTuple):
-    """Limit surface: pressure points (K, 2) with shares (K,) that sum to 1; or, without points, an ellipsoid with c^2."""
+    """Limit surface: pressure points (K, 2) with shares (K,) that sum to 1; or, without points, an ellipsoid with c^2.
+
+    Of points, c^2 is where the search for their spin begins.
+    """
 
     points: Array
     shares: Array
@@ -56,14 +61,13 @@ def uniform(shape: Shape, per_side: int = 12) -> Surface:
     areas = shapely.area(parts)
     kept = areas > 1e-6 * side**2
     points = shapely.get_coordinates(shapely.centroid(parts[kept]))
-    return Surface(points - mass_properties(shape.vertices).centroid, areas[kept] / areas[kept].sum(), 0.0)
+    arms, shares = points - mass_properties(shape.vertices).centroid, areas[kept] / areas[kept].sum()
+    return Surface(arms, shares, float(shares @ np.linalg.norm(arms, axis=1)) ** 2)
 
 
 def characteristic(surface: Surface) -> float:
     """c: the greatest friction torque over the greatest friction force [length]."""
-    if len(surface.shares) == 0:
-        return float(np.sqrt(surface.squared))
-    return float(surface.shares @ np.linalg.norm(surface.points, axis=1))
+    return float(np.sqrt(surface.squared))
 
 
 @njit(cache=True, error_model="numpy")
@@ -73,33 +77,35 @@ def motion(
     """Of an object touched at (x, y), inward normal n, by a finger with velocity u and a coefficient of friction."""
     if nx * ux + ny * uy <= 0:
         return Motion(0.0, 0.0, 0.0, FREE)
-    force_x, force_y, vx, vy, spin = _sticking(surface, x, y, ux, uy)
+    guess = _elliptic_spin(surface, x, y, ux, uy)
+    force_x, force_y, vx, vy, spin = _sticking(surface, x, y, ux, uy, guess)
     normal, tangential = nx * force_x + ny * force_y, -ny * force_x + nx * force_y
     if abs(tangential) <= friction * normal:
         return Motion(vx, vy, spin, STICKING)
     side = friction if tangential > 0 else -friction
-    vx, vy, spin = _under_force(surface, x, y, nx - side * ny, ny + side * nx)
+    vx, vy, spin = _under_force(surface, x, y, nx - side * ny, ny + side * nx, spin / np.hypot(ux, uy))
     scale = (nx * ux + ny * uy) / (nx * (vx - spin * y) + ny * (vy + spin * x))
     return Motion(scale * vx, scale * vy, scale * spin, SLIDING)
 
 
 @njit(cache=True, error_model="numpy")
+def _elliptic_spin(s: Surface, x: float, y: float, ux: float, uy: float) -> float:
+    """Spin on an ellipsoid where the touched point moves with the finger."""
+    return (x * uy - y * ux) / (s.squared + x * x + y * y)
+
+
+@njit(cache=True, error_model="numpy")
 def _sticking(
-    s: Surface, x: float, y: float, ux: float, uy: float
+    s: Surface, x: float, y: float, ux: float, uy: float, guess: float
 ) -> tuple[float, float, float, float, float]:
     """Force (up to a factor) and twist where the touched point moves with the finger."""
     if len(s.shares) == 0:
-        a, b, d = 1 + y * y / s.squared, -x * y / s.squared, 1 + x * x / s.squared
-        determinant = a * d - b * b
-        fx, fy = (d * ux - b * uy) / determinant, (a * uy - b * ux) / determinant
-        return fx, fy, fx, fy, (x * fy - y * fx) / s.squared
+        spin = _elliptic_spin(s, x, y, ux, uy)
+        vx, vy = ux + spin * y, uy - spin * x
+        return vx, vy, vx, vy, spin
     # Least dissipation over the spin: the slope rises; Newton's method, kept between spins with slopes of both signs.
-    low, high = -1e-3 * np.hypot(ux, uy), 1e-3 * np.hypot(ux, uy)
-    while _dissipation(s, x, y, ux, uy, low)[2] > 0:
-        low *= 4
-    while _dissipation(s, x, y, ux, uy, high)[2] < 0:
-        high *= 4
-    spin = 0.5 * (low + high)
+    spin, low, high = guess, -np.inf, np.inf
+    fine = 1e-11 * np.hypot(ux, uy) / np.sqrt(s.squared)
     for _ in range(ROUNDS):
         fx, fy, slope, curvature = _dissipation(s, x, y, ux, uy, spin)
         if slope > 0:
@@ -107,10 +113,9 @@ def _sticking(
         else:
             low = spin
         trial = spin - slope / curvature
-        spin = trial if low < trial < high else 0.5 * (low + high)
-        if high - low < 1e-12 * (abs(low) + abs(high)):
+        if abs(trial - spin) < fine or high - low < fine:
             break
-    fx, fy, _, _ = _dissipation(s, x, y, ux, uy, spin)
+        spin = trial if low < trial < high else 0.5 * (low + high)
     return fx, fy, ux + spin * y, uy - spin * x, spin
 
 
@@ -135,20 +140,27 @@ def _dissipation(
 
 
 @njit(cache=True, error_model="numpy")
-def _under_force(s: Surface, x: float, y: float, ex: float, ey: float) -> tuple[float, float, float]:
+def _under_force(
+    s: Surface, x: float, y: float, ex: float, ey: float, guess: float
+) -> tuple[float, float, float]:
     """Twist (up to a factor) of the object under a force along e at (x, y)."""
     if len(s.shares) == 0:
         return ex, ey, (x * ey - y * ex) / s.squared
     # The contact's velocity has direction phi; of all directions with e . v = 1, sticking there costs least dissipation where
     # its own force is along e: the force's angle to e changes sign, and grows with phi.
     angle = np.arctan2(ey, ex)
-    low, high = angle - 0.5 * np.pi + 1e-9, angle + 0.5 * np.pi - 1e-9
-    vx = vy = spin = 0.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        fx, fy, vx, vy, spin = _sticking(s, x, y, np.cos(middle), np.sin(middle))
-        if ex * fy - ey * fx > 0:
-            high = middle
+    low, high, below, above, side = angle - 0.5 * np.pi, angle + 0.5 * np.pi, -1.0, 1.0, 0
+    vx = vy = 0.0
+    for _ in range(ROUNDS):  # false position; twice on one side, the other end's value counts half (Illinois)
+        middle = (low * above - high * below) / (above - below)
+        fx, fy, vx, vy, guess = _sticking(s, x, y, np.cos(middle), np.sin(middle), guess)
+        off = (ex * fy - ey * fx) / np.hypot(fx, fy)
+        if abs(off) < CLOSE:
+            break
+        if off > 0:
+            high, above, below = middle, off, 0.5 * below if side > 0 else below
+            side = 1
         else:
-            low = middle
-    return vx, vy, spin
+            low, below, above = middle, off, 0.5 * above if side < 0 else above
+            side = -1
+    return vx, vy, guess

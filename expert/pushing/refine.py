@@ -1,4 +1,4 @@
-"""The last push of a plan, made exact: three numbers of a push against three of a pose, by damped Gauss-Newton in batches."""
+"""Pushes made exact by damped Gauss-Newton: the last push of many plans, three numbers against three of a pose, or all of one plan."""
 
 import numpy as np
 
@@ -39,6 +39,7 @@ def refine(
         changes = goal.residual(probed).reshape(-1, 3, 3) - residual[moved_on, None]
         slopes[moved_on] = changes.swapaxes(1, 2)
         step = _damped(slopes, residual, damping) * nudges
+        step = np.nan_to_num(step)  # next to pushes without outcome
         trial = best + np.clip(step, -REACH * scale, REACH * scale)
         trial[:, 2] = np.maximum(trial[:, 2], unit)
         shifts, ends = table.outcomes(trial)
@@ -52,10 +53,48 @@ def refine(
     return best, after, fingers, np.sqrt((residual**2).sum(1))
 
 
+def refine_plan(
+    table: Table, goal: Goal, start: Array, chain: Array, rounds: int, unit: float, enough: float
+) -> tuple[Array, float]:
+    """Pushes (n, 3) from a pose (3,), each changed a little so that the last one ends nearer the goal; its error.
+
+    A push alone may have no say in some direction; a plan has more numbers than a pose.  Ends below the error `enough`.
+    """
+    scale = np.array([unit, 1.0, unit])
+    nudges, count = NUDGES * scale, len(chain)
+    best, shifts = chain.copy(), table.outcomes(chain)[0]
+    residual, damping = goal.residual(_ended(start, shifts)), np.full(1, 1e-3)
+    for _ in range(rounds):
+        if np.linalg.norm(residual) <= enough:
+            break
+        probed = table.outcomes((best[:, None] + nudges * np.eye(3)).reshape(-1, 3))[0]
+        tried = np.repeat(shifts[None], 3 * count, axis=0)
+        tried[np.arange(3 * count), np.repeat(np.arange(count), 3)] = probed
+        slopes = (goal.residual(_ended(start, tried)) - residual).T
+        step = _damped(np.nan_to_num(slopes)[None], residual[None], damping)[0].reshape(count, 3) * nudges
+        trial = best + np.clip(step, -REACH * scale, REACH * scale)
+        trial[:, 2] = np.maximum(trial[:, 2], unit)
+        moved = table.outcomes(trial)[0]
+        found = goal.residual(_ended(start, moved))
+        if found @ found < residual @ residual:
+            best, shifts, residual, damping = trial, moved, found, damping / 5
+        else:
+            damping = damping * 20
+    return best, float(np.linalg.norm(residual))
+
+
+def _ended(start: Array, shifts: Array) -> Array:
+    """Pose (..., 3) after shifts (..., n, 3), one after the other."""
+    pose = np.broadcast_to(start, (*shifts.shape[:-2], 3))
+    for k in range(shifts.shape[-2]):
+        pose = composed(pose, shifts[..., k, :])
+    return pose
+
+
 def _damped(slopes: Array, residual: Array, damping: Array) -> Array:
-    """Steps (N, 3) of least squares with Marquardt's scaling."""
+    """Steps (N, P) of least squares for slopes (N, 3, P), with Marquardt's scaling."""
     normal = slopes.swapaxes(1, 2) @ slopes
     diagonal = np.einsum("nii->ni", normal)
     floor = 1e-9 * (diagonal.sum(1, keepdims=True) + 1e-300)
-    damped = normal + (damping[:, None] * diagonal + floor)[:, :, None] * np.eye(3)
+    damped = normal + (damping[:, None] * diagonal + floor)[:, :, None] * np.eye(slopes.shape[2])
     return -np.linalg.solve(damped, slopes.swapaxes(1, 2) @ residual[..., None])[..., 0]

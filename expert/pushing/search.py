@@ -126,22 +126,39 @@ def beam_search(
 
     Both sorted by score within their level; unfilled rows have score inf.
     """
-    nodes, ends, root = _empty(depth * width), _empty(endings), _empty(1)
-    root[0].x, root[0].y, root[0].angle = pose
-    root[0].finger_x, root[0].finger_y = finger
+    nodes, ends = unfilled(depth * width), unfilled(endings)
     slack = depth_in_walls(task.room, pose) + 1e-9
-    _expand(moves, task, prices, root, -1, nodes[:width], ends, slack)
+    grow(moves, task, prices, root_of(pose, finger), -1, nodes[:width], ends, slack)
     for level in range(1, depth):
-        for k in range((level - 1) * width, level * width):
-            if nodes[k].score < np.inf:
-                beam = nodes[level * width : (level + 1) * width]
-                _expand(moves, task, prices, nodes[k : k + 1], k, beam, ends, slack)
+        above, beam = nodes[(level - 1) * width : level * width], nodes[level * width : (level + 1) * width]
+        grow(moves, task, prices, above, (level - 1) * width, beam, ends, slack)
     return nodes, ends
 
 
 @njit(cache=True, error_model="numpy")
-def _empty(count: int) -> Nodes:
-    """Unfilled nodes."""
+def root_of(pose: Array, finger: Array) -> Nodes:
+    """The plan without a push (1,), from a pose (3,) and with the finger (2,) in its frame."""
+    root = unfilled(1)
+    root[0].x, root[0].y, root[0].angle = pose
+    root[0].finger_x, root[0].finger_y = finger
+    root[0].score = 0.0
+    return root
+
+
+@njit(cache=True, error_model="numpy")
+def grow(
+    moves: Moves, task: Task, prices: Prices, nodes: Nodes, first: int, beam: Nodes, ends: Nodes, slack: float
+) -> None:
+    """Put the children of nodes (n,), whose rows begin at `first`, into the beam and among the endings."""
+    for k in range(len(nodes)):
+        if nodes[k].score < np.inf:
+            row = first + k if first >= 0 else -1
+            _expand(moves, task, prices, nodes[k : k + 1], row, beam, ends, slack)
+
+
+@njit(cache=True, error_model="numpy")
+def unfilled(count: int) -> Nodes:
+    """Nodes (count,) of score inf."""
     nodes = np.zeros(count, NODE)
     for k in range(count):
         nodes[k].score, nodes[k].parent, nodes[k].entry = np.inf, -1, -1
@@ -182,7 +199,7 @@ def _push(
     slack: float,
 ) -> None:
     """Put the best push from a station into the beam, and what ends near the goal among the endings."""
-    node, child, best = at[0], _empty(1), _empty(1)
+    node, child, best = at[0], unfilled(1), unfilled(1)
     best[0].score = beam[-1].score
     for entry in range(moves.first[station], moves.first[station + 1]):
         time = start + moves.steps[entry]

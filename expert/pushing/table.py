@@ -22,8 +22,8 @@ class PushModel(Protocol):
     def origin(self) -> Array: ...
     @property
     def radius(self) -> float: ...
-    def steps(self, lengths: Array) -> IntArray:
-        """Control steps of pushes of lengths (N,)."""
+    def steps(self, lengths: Array) -> Array | IntArray:
+        """How long pushes of lengths (N,) take: control steps, or seconds."""
 
     def leads(self, lengths: Array) -> Array:
         """How far the commands of such pushes reach beyond their starts (N,)."""
@@ -67,7 +67,7 @@ class Table:
     parameters: Array
     shifts: Array
     fingers: Array
-    steps: IntArray
+    steps: Array | IntArray
     first: IntArray
     ways: Roads
 

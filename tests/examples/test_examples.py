@@ -25,6 +25,7 @@ RUNS = [
     pytest.param("figures.py", "pictures", ["3-6", "5-16"], ["Fig. 3-6", "objective", "caged"], marks=SLOW),
     pytest.param("grasp_figures.py", "starts.png", ["5-30"], [r"t: certified by goal_cell", "hourglass_miqp2: "], marks=SLOW),
     pytest.param("against_force_closure.py", "ends.png", [], ["certified by goal_cell", "force closure: median error"], marks=SLOW),
+    pytest.param("push_a_box.py", "box.png", [], ["solved after", "the checker says: sound"]),
     pytest.param("push_t.py", "push_t.gif", [], [r"success after \d+ steps, 9\d\.\d% covered"]),
     pytest.param("table_4_1.py", "table", ["--small"], [r"\| DLM \|", "report: "], marks=SLOW),
 ]  # fmt: skip

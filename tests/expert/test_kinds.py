@@ -14,6 +14,7 @@ SOLVERS = (
     "expert.contact",
     "expert.caging",
     "expert.grasping",
+    "expert.pushing",
     "expert.mip",
     "expert.loops",
     "cvxpy",
@@ -44,6 +45,7 @@ def loaded(path: str, call: str, names: tuple[str, ...]) -> list[str]:
     [
         (STATED, "assert KINDS['cage'].verify(problem.task, None).verdict == 'caged'"),
         ("configs/problem/certified_grasp/t.yaml", REFUSED),
+        ("configs/problem/push/tee.yaml", REFUSED),
         ("configs/problem/contact_trajectory/block_slide_one_finger.yaml", "import expert.verify.plan.check"),
     ],
 )
@@ -66,7 +68,7 @@ def test_every_kind_has_a_format_and_does_all_that_the_commands_ask(name: str) -
         assert getattr(type(kind), role) is not getattr(Kind, role)
 
 
-@pytest.mark.parametrize("name", ["contact_trajectory", "certified_grasp"])
+@pytest.mark.parametrize("name", ["contact_trajectory", "certified_grasp", "push"])
 def test_a_view_of_a_kind_without_views_is_refused(name: str, tmp_path: Path) -> None:
     with pytest.raises(InvalidProblem, match="view: expected none for this kind, got slice"):
         KINDS[name].draw(None, None, tmp_path / "a.png", "slice")

@@ -29,6 +29,7 @@ from expert.world.named import named_shape
 from expert.world.shape import Shape
 from expert.world.walls import segments
 from tests.support.hand_plans import sliding_block
+from tests.support.pushes import square_problem
 from tests.support.same import assert_same
 
 SHIPPED = sorted(Path("configs/problem").rglob("*.yaml"))
@@ -51,7 +52,13 @@ GRASP = GraspProblem(
     shape=T, pose=np.array([0, 0.1, -2]), grippers=JAWS, parallel=True, cost="acceleration", margin=0.002
 )
 STANDING = Arrangement(shape=T, pose=np.zeros(3), fingers=np.array([[0.2, 0.1], [-0.2, 0.1]]))
-MADE = {"cage": CAGE, "arrangement": STANDING, "grasp": GRASP, "contact": sliding_block()[0]}
+MADE = {
+    "cage": CAGE,
+    "arrangement": STANDING,
+    "grasp": GRASP,
+    "contact": sliding_block()[0],
+    "push": square_problem(),
+}
 
 
 def test_there_are_problems_of_every_kind_and_every_kind_can_be_read_and_solved() -> None:

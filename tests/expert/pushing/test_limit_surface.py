@@ -92,3 +92,15 @@ def test_pressure_points_lie_about_the_centroid():
 def test_an_ellipsoid_needs_a_length():
     with pytest.raises(InvalidProblem, match="limit_surface"):
         ellipsoid(0.0)
+
+
+def test_characteristic_lengths_of_a_rectangle_and_of_a_disc_are_known():
+    """Mean distances to the centre: of a rectangle a x b by its diagonal d, and two thirds of a disc's radius."""
+    a, b = 4.0, 1.0
+    rectangle = Shape(vertices=[[0, 0], [a, 0], [a, b], [0, b]])
+    d = np.hypot(a, b)
+    mean = (d + a**2 / (2 * b) * np.log((b + d) / a) + b**2 / (2 * a) * np.log((a + d) / b)) / 6
+    assert characteristic(uniform(rectangle, 60)) == pytest.approx(mean, rel=2e-3)
+    angles = np.linspace(0, 2 * np.pi, 120, endpoint=False)
+    disc = Shape(vertices=np.stack([np.cos(angles), np.sin(angles)], -1))
+    assert characteristic(uniform(disc, 40)) == pytest.approx(2 / 3, rel=2e-3)

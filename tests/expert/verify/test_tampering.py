@@ -18,6 +18,7 @@ SOLVED = {
     "contact_trajectory on a wall": "contact_trajectory/block_pivot_two_fingers.yaml",
     "no contact_trajectory": "contact_trajectory/block_lift_one_finger_infeasible.yaml",
     "cage": "cage/m_grippers.yaml",
+    "push": "push/box_ellipsoid.yaml",
 }
 GRASP = {
     "schema": 1,
@@ -64,6 +65,8 @@ def lies(key: str, value: Any) -> Iterator[Any]:
             "none_found",
             "certified",
             "uncertified",
+            "solved",
+            "no_plan",
         }
         yield from sorted(new for new in statuses - {value} if (value, new) not in WEAKER)
     elif key == "rotation_range":
