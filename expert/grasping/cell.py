@@ -122,7 +122,7 @@ class GoalCell:
         return Rows(V, np.array([low - shift]), np.array([high - shift]))
 
     def _in_wedge(self, n: int, A: Array, constant: Array) -> Rows:
-        wedge = self.table.wedges[self.chosen[n]]
+        wedge = self.table.wedge(self.chosen[n])
         if wedge is None:
             return Rows(np.empty((0, self.count, 2)), np.empty(0), np.empty(0))
         V = np.einsum("wd,dnx->wnx", wedge.A, A)

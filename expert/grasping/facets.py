@@ -45,14 +45,30 @@ class Facets:
     def __len__(self) -> int:
         return len(self.offsets)
 
+    def wedge(self, k: int) -> Region | None:
+        """Convex free region over a facet; None where all beyond its line is free."""
+        if k not in self._wedges:
+            self._wedges[k] = _wedge(self, k)
+        return self._wedges[k]
+
     @cached_property
-    def wedges(self) -> tuple[Region | None, ...]:
-        """Convex free region over each facet; None where all beyond its line is free."""
-        return tuple(_wedge(self, k) for k in range(len(self)))
+    def _wedges(self) -> dict[int, Region | None]:
+        """Those that were asked for: on objects of many facets each takes a while."""
+        return {}
+
+    @cached_property
+    def sides(self) -> np.ndarray:
+        """What lies beyond the line of each facet, as polygons (V,) that reach far over the object."""
+        size = 4 * float(np.abs(self.vertices).max())
+        foot, n, t = self.offsets[:, None] * self.normals, self.normals, self.tangents
+        corners = np.stack(
+            [foot - size * t, foot + size * t, foot + size * (t + n), foot - size * (t - n)], axis=1
+        )
+        return shapely.polygons(corners)
 
     def beyond(self, k: int) -> Region:
         """The half-plane beyond facet k's line, less what its wedge excludes."""
-        wedge = self.wedges[k]
+        wedge = self.wedge(k)
         normals, offsets = -self.normals[[k]], -self.offsets[[k]]
         if wedge is None:
             return Region(normals, offsets)
@@ -98,35 +114,27 @@ def tuples(table: Facets, count: int) -> Iterator[tuple[int, ...]]:
 def _wedge(table: Facets, k: int) -> Region | None:
     """Half-planes beyond facets, the fewest that keep the region over facet k free of the object."""
     polygon = shapely.Polygon(table.vertices)
-    size = 4 * float(np.abs(table.vertices).max())
-    region = _beyond(table, k, size)
-    chosen: list[int] = []
+    region, chosen = table.sides[k], list[int]()
     area = 1e-9 * polygon.area
     while region.intersection(polygon).area > area:
-        best = max(
-            (j for j in range(len(table)) if j != k and j not in chosen),
-            key=lambda j: _merit(region.intersection(_beyond(table, j, size)), polygon, table, k),
-        )
-        smaller = region.intersection(_beyond(table, best, size))
-        if smaller.area >= region.area - area:
+        smaller = shapely.intersection(region, table.sides)
+        kept, overlap = _merit(smaller, polygon, table, k)
+        kept[[k, *chosen]] = -1.0
+        best = int(np.lexsort((overlap, -kept))[0])
+        if smaller[best].area >= region.area - area:
             return Region(
                 np.zeros((1, 2)), np.array([-1.0])
             )  # nothing separates: no finger may use this facet
-        region = smaller
+        region = smaller[best]
         chosen.append(best)
     if not chosen:
         return None
     return Region(-table.normals[chosen], -table.offsets[chosen])
 
 
-def _merit(region: shapely.Polygon, polygon: shapely.Polygon, table: Facets, k: int) -> tuple[float, float]:
-    """How much of facet k remains next to the region, then how little of the object."""
-    a, b = facets(table.vertices)
-    kept = region.buffer(1e-9).intersection(shapely.LineString([a[k], b[k]])).length
-    whole = float(np.linalg.norm(b[k] - a[k]))
-    return round(min(kept / whole, 1.0), 2), -region.intersection(polygon).area
-
-
-def _beyond(table: Facets, k: int, size: float) -> shapely.Polygon:
-    foot, n, t = table.offsets[k] * table.normals[k], table.normals[k], table.tangents[k]
-    return shapely.Polygon([foot - size * t, foot + size * t, foot + size * (t + n), foot - size * (t - n)])
+def _merit(regions: np.ndarray, polygon: shapely.Polygon, table: Facets, k: int) -> tuple[Array, Array]:
+    """What share of facet k remains next to each region, to a hundredth, and how much of the object is inside."""
+    a, b = (ends[k] for ends in facets(table.vertices))
+    beside = shapely.intersection(shapely.buffer(regions, 1e-9), shapely.LineString([a, b]))
+    share = shapely.length(beside) / float(np.linalg.norm(b - a))
+    return np.round(np.minimum(share, 1.0), 2), shapely.area(shapely.intersection(regions, polygon))

@@ -229,6 +229,8 @@ def decomposed(task: RelativeProblem, share: float = 1.0) -> Iterator[Proposal]:
     """
     budget = task.budget.part(TRYING * task.budget.left)
     ranked = list(task.cells())
+    if task.budget.over:
+        return
     geometry = FacetGeometry(task.table.vertices, task.margin, MOST_PIECES)
     knots = schedule(share * task.problem.half_ranges, task.margin)
     for first in range(0, len(ranked), BATCH):
