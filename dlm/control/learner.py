@@ -9,7 +9,7 @@ from expert.geometry.pose import Array, to_world, wrapped
 from expert.pushing.identify import LEVER, Seen, identified, misfit
 from expert.pushing.planner import Planner
 from expert.pushing.room import inside
-from expert.pushing.table import push_table
+from expert.pushing.table import again
 
 KEPT_PUSHES = 6
 REST = 1.2
@@ -73,7 +73,7 @@ class Learner:
         found = identified(model, [*self.pushes, push], self.first.model.block)
         if misfit(found, push) > BETTER * misfit(model, push):
             return False
-        table = push_table(found, self.first.table.grid, self.first.table.ways)
+        table = again(found, self.first.table)
         self.planner = replace(self.first, table=table, model=found)
         return True
 

@@ -1,6 +1,6 @@
 """What pushes do to an object, in its own frame: rolled out once, composed ever after."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -104,31 +104,39 @@ def steadiness(model: PushModel, curve: Contour, parameters: Array, shifts: Arra
     return np.max([span(model, end, shifts) for end in ends], axis=0)
 
 
-def push_table(model: PushModel, grid: Grid, ways: Roads | None = None) -> Table:
-    """Roll out all pushes of a grid; those that move the object by less than grid.least are left out.
-
-    ways: of a table of the same outline and grid, if there is one.
-    """
+def push_table(model: PushModel, grid: Grid) -> Table:
+    """Roll out all pushes of a grid; those that move the object by less than grid.least are left out, and unsteady ones."""
     curve = contour(model.shape, model.origin, model.radius + grid.gap)
     stations = np.arange(grid.stations) * curve.length / grid.stations
     axes = np.meshgrid(stations, grid.angles, grid.lengths, indexing="ij")
     parameters = np.stack([axis.ravel() for axis in axes], -1)
+    station = np.repeat(np.arange(grid.stations), len(grid.angles) * len(grid.lengths))
+    ways = roads(model.shape, model.origin, model.radius, grid.gap, curve.at(stations)[0])
+    rolled = _rolled_out(model, curve, grid, parameters, station, ways)
+    unsteady = steadiness(model, curve, rolled.parameters, rolled.shifts, grid.wobble)
+    return _part(rolled, unsteady <= grid.spread * grid.wobble)
+
+
+def again(model: PushModel, table: Table) -> Table:
+    """The pushes of a table under another model of the same outline, as far as they move the object."""
+    station = np.repeat(np.arange(len(table.first) - 1), np.diff(table.first))
+    return _rolled_out(model, table.curve, table.grid, table.parameters, station, table.ways)
+
+
+def _rolled_out(
+    model: PushModel, curve: Contour, grid: Grid, parameters: Array, station: IntArray, ways: Roads
+) -> Table:
+    """The table of pushes (N, 3) from stations (N,), without those that move the object too little."""
     shifts, fingers = model.outcomes(*straight(curve, parameters))
-    moved = span(model, shifts, 0 * shifts) >= grid.least
-    moved &= steadiness(model, curve, parameters, shifts, grid.wobble) <= grid.spread * grid.wobble
-    station = np.repeat(np.arange(grid.stations), len(grid.angles) * len(grid.lengths))[moved]
     first = np.searchsorted(station, np.arange(grid.stations + 1))
-    parameters = parameters[moved]
-    if ways is None:
-        ways = roads(model.shape, model.origin, model.radius, grid.gap, curve.at(stations)[0])
-    return Table(
-        model,
-        curve,
-        grid,
-        parameters,
-        shifts[moved],
-        fingers[moved],
-        model.steps(parameters[:, 2]),
-        first,
-        ways,
-    )
+    steps = model.steps(parameters[:, 2])
+    whole = Table(model, curve, grid, parameters, shifts, fingers, steps, first, ways)
+    return _part(whole, span(model, shifts, 0 * shifts) >= grid.least)
+
+
+def _part(table: Table, kept: np.ndarray) -> Table:
+    """The pushes of a mask (K,)."""
+    before = np.concatenate([[0], np.cumsum(kept)])
+    names = ("parameters", "shifts", "fingers", "steps")
+    rows = {name: getattr(table, name)[kept] for name in names}
+    return replace(table, **rows, first=before[table.first])

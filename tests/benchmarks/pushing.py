@@ -26,7 +26,7 @@ from dlm.control.episodes import Episode, Stop, run_episode
 from dlm.control.results import summary
 from dlm.control.worlds import PushT, Spoiler
 from expert.pushing.impulses import ANGLE, X, run
-from expert.pushing.table import push_table
+from expert.pushing.table import again
 
 SEEDS = {"state": 0, "pixels": 10_000, "worse camera": 20_000, "other blocks": 30_000, "own stop": 40_000}
 Bar = tuple[str, str, float]
@@ -95,7 +95,7 @@ def times(episodes: int) -> dict[str, float]:
     still = np.zeros(2)
     planner.plan(*places[0], still, 1.5)
     began = time.process_time()
-    table = push_table(planner.model, planner.table.grid, planner.table.ways)
+    table = again(planner.model, planner.table)
     built = time.process_time()
     for place in places:
         planner.plan(*place, still, 1.5)
