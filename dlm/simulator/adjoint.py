@@ -7,10 +7,10 @@ What remains is the chain rule through the contact geometry, kept here in the or
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from dlm.simulator import support
 from dlm.simulator.contact import FACET, WALL
+from dlm.simulator.kernels import borrowing, compiled, inlined
 from dlm.simulator.problem import OPEN, SLIP_PLUS, STICK, Problem, reduced_system, solve_linear
 from dlm.simulator.step import (
     CORRECTION,
@@ -51,7 +51,7 @@ class ContactBar(NamedTuple):
     gap: float
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def softness_slope(gap: float, kappa: float) -> float:
     """Derivative of `softness` with respect to the gap: (1 - a) / a = (exp(kappa gap) - 1) / 2 where the gap is open."""
     if np.isinf(kappa) or gap < -TOUCHING or kappa * gap > 500:
@@ -60,7 +60,7 @@ def softness_slope(gap: float, kappa: float) -> float:
     return slope if gap > TOUCHING else slope / 2
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def bias_slope(gap: float, h: float, kappa: float) -> float:
     """Derivative of `bias` with respect to the gap."""
     if gap < -SHALLOW:
@@ -70,7 +70,7 @@ def bias_slope(gap: float, h: float, kappa: float) -> float:
     return 0.0 if gap > TOUCHING else 0.5 / h
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def adjoint_step(
     world: World, state: State, commands: np.ndarray, bar: State, command_bar: np.ndarray, work: Work
 ) -> None:
@@ -107,15 +107,17 @@ def adjoint_step(
             bar.fingers[c, d] -= follow * ends[c, d]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _linearise_support(n: int, world: World, state: State, work: Work) -> None:
     """The contact problem with the support friction linearised at the velocity that was found."""
-    w = support.directions(world, state.pose, work.velocity)
-    support_mobility(world, state, work.velocity.copy(), w, work)
+    for d in range(3):
+        work.guess[d] = work.velocity[d]
+    support.directions(world, state.pose, work.guess, work.directions)
+    support_mobility(world, state, work)
     assemble_problem(n, world, work)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@compiled
 def impulse_adjoint(n: int, world: World, end: np.ndarray, ends: np.ndarray, work: Work) -> np.ndarray:
     """Adjoints (2 n,) of the impulses, given those of the velocities of object (3,) and fingers (C, 2)."""
     weighted, out, give = work.mobility @ end, np.zeros(2 * n), finger_mobility(world)
@@ -128,7 +130,7 @@ def impulse_adjoint(n: int, world: World, end: np.ndarray, ends: np.ndarray, wor
     return out
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@compiled
 def row_multipliers(n: int, problem: Problem, adjoint: np.ndarray) -> np.ndarray:
     """w (2 n,) with B^T w = adjoint of the impulses, for the equations of the active set, and 0 on all other rows."""
     contacts, rows = problem.contacts, problem.rows
@@ -158,7 +160,7 @@ def row_multipliers(n: int, problem: Problem, adjoint: np.ndarray) -> np.ndarray
     return w
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _adjoint_contact(i: int, world: World, state: State, back: Back, bar: State, work: Work) -> None:
     """Adjoint of contact i's rows, bias and compliance, then of its geometry."""
     contacts, rows, _, _ = work.problem
@@ -190,7 +192,7 @@ def _adjoint_contact(i: int, world: World, state: State, back: Back, bar: State,
     _adjoint_geometry(contact, world, state, ContactBar(nx_bar, ny_bar, ax_bar, ay_bar, gap_bar), bar)
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _adjoint_geometry(contact: np.record, world: World, state: State, of: ContactBar, bar: State) -> None:
     """Adjoint of normal, contact point and gap with respect to the object's pose and the finger."""
     q, facet = state.pose, world.facets[contact.feature]
@@ -221,7 +223,7 @@ def _adjoint_geometry(contact: np.record, world: World, state: State, of: Contac
     _to_pose(of.x - gx, of.y - gy, rx, ry, bar.pose)
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _to_pose(gx: float, gy: float, rx: float, ry: float, pose_bar: np.ndarray) -> None:
     """Adjoint of a body point at arm (rx, ry)."""
     pose_bar[0] += gx

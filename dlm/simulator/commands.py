@@ -12,7 +12,8 @@ point of the surface.  With straight lines all of them are the identity.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from dlm.simulator.kernels import borrowing, compiled
 
 
 class Commands(NamedTuple):
@@ -36,7 +37,7 @@ class Commands(NamedTuple):
     bend: np.ndarray
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def commands_for(samples: int, knots: int, fingers: int) -> Commands:
     """A table of zeros."""
     shape, at_knots = (samples, fingers, 2), (knots, fingers)
@@ -55,7 +56,7 @@ def commands_for(samples: int, knots: int, fingers: int) -> Commands:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def command(
     table: Commands, positions: np.ndarray, forces: np.ndarray, stiffness: float, out: np.ndarray
 ) -> None:
@@ -88,7 +89,7 @@ def command(
             out[i, c, 1] = frame[1] + sn * x + cs * y
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def pull_back(
     table: Commands, adjoint: np.ndarray, stiffness: float, positions: np.ndarray, forces: np.ndarray
 ) -> None:
@@ -117,7 +118,7 @@ def pull_back(
             )
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _add_to_world(frame: np.ndarray, x: float, y: float, out: np.ndarray) -> None:
     cs, sn = np.cos(frame[2]), np.sin(frame[2])
     out[0] += cs * x - sn * y

@@ -6,8 +6,8 @@ A contact has a unit direction n along which its force pushes the object, a poin
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from dlm.simulator.kernels import borrowing, compiled, inlined
 from dlm.simulator.world import World, vertex_arm
 
 FACET, VERTEX, WALL = 0, 1, 2
@@ -34,7 +34,7 @@ class Moment(NamedTuple):
     finger_velocity: np.ndarray
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def activation(gap: float, kappa: float) -> float:
     """min(1, 2 sigmoid(-kappa gap)), the smoothed contact indicator (Thesis 4-CT9); 0 or 1 for kappa = inf."""
     if gap <= 0:
@@ -42,7 +42,7 @@ def activation(gap: float, kappa: float) -> float:
     return 2 / (1 + np.exp(min(kappa * gap, 500.0)))
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def nearest(facets: np.ndarray, x: float, y: float) -> tuple[int, int, float]:
     """Feature of the boundary nearest to a body point: kind, index, signed distance (negative inside)."""
     n = len(facets)
@@ -68,25 +68,25 @@ def nearest(facets: np.ndarray, x: float, y: float) -> tuple[int, int, float]:
     return kind, index, side * np.sqrt(best)
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def collect(world: World, now: Moment, out: np.ndarray) -> int:
     """Fill `out`, an array of CONTACT, with those that may act during the next step; return their number."""
-    n = 0
+    n = np.int64(0)  # a literal has a type of its own, and all below would be compiled twice
     for c in range(len(now.fingers)):
         dx, dy = now.fingers[c, 0] - now.pose[0], now.fingers[c, 1] - now.pose[1]
         bx, by = now.cs * dx + now.sn * dy, now.cs * dy - now.sn * dx
         kind, index, _ = nearest(world.facets, bx, by)
-        n = _add_finger(world, now, c, (kind, index), out, n)
+        n = _add_finger(world, now, c, (np.int64(kind), index), out, n)
         if kind == FACET:
             other = _second_facet(world.facets, index, bx, by)
             if other >= 0:
-                n = _add_finger(world, now, c, (FACET, other), out, n)
+                n = _add_finger(world, now, c, (np.int64(FACET), other), out, n)
     for w in range(len(world.walls)):
         n = _add_wall(world, now, w, out, n)
     return n
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _second_facet(facets: np.ndarray, index: int, x: float, y: float) -> int:
     """Facet beyond a reflex end of facet `index` that a point faces too; -1 if there is none."""
     count = len(facets)
@@ -101,7 +101,7 @@ def _second_facet(facets: np.ndarray, index: int, x: float, y: float) -> int:
     return -1
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _acts(gap: float, approach: float, kappa: float) -> bool:
     """Whether a contact can matter that closes by `approach` during the step."""
     if np.isinf(kappa):
@@ -109,7 +109,7 @@ def _acts(gap: float, approach: float, kappa: float) -> bool:
     return activation(gap, kappa) > LEAST_ACTIVATION
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _add_finger(world: World, now: Moment, c: int, feature: tuple[int, int], out: np.ndarray, n: int) -> int:
     """Contact of finger c with a feature (kind, index), unless it is out of reach."""
     kind, index = feature
@@ -139,7 +139,7 @@ def _add_finger(world: World, now: Moment, c: int, feature: tuple[int, int], out
     return n + 1
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _add_wall(world: World, now: Moment, w: int, out: np.ndarray, n: int) -> int:
     """The vertices that may touch wall w first, however the object moves: the lower convex hull of those near it."""
     wall, base = world.walls[w], n
@@ -160,29 +160,29 @@ def _add_wall(world: World, now: Moment, w: int, out: np.ndarray, n: int) -> int
     return n if n - base <= 2 else _lower_hull(out, base, n)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _lower_hull(out: np.ndarray, base: int, n: int) -> int:
     """Keep, of the contacts base to n with one wall, those that are not above a line between two others; the new number.
 
     The others cannot touch before these do: gaps change linearly along the wall in a small motion.  Collinear vertices
     between two others go too.
     """
-    redundant = np.zeros(n - base, np.bool_)
     for i in range(base, n):
+        redundant = False
         left, right = -np.inf, np.inf  # steepest slopes from one side and to the other
         for j in range(base, n):
             along = (out[j].x - out[i].x) * out[i].ny - (out[j].y - out[i].y) * out[i].nx
             rise = out[j].gap - out[i].gap
             if abs(along) < SAME_PLACE:
-                redundant[i - base] |= rise < 0 or (rise == 0 and j < i)
+                redundant |= rise < 0 or (rise == 0 and j < i)
             elif along < 0:
                 left = max(left, rise / along)
             else:
                 right = min(right, rise / along)
-        redundant[i - base] |= left >= right - COLLINEAR
+        out[i].state = redundant or left >= right - COLLINEAR  # nobody has a state yet
     kept = base
     for i in range(base, n):
-        if not redundant[i - base]:
+        if not out[i].state:
             out[kept] = out[i]
             kept += 1
     return kept

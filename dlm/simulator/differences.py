@@ -1,16 +1,17 @@
 """Derivatives of rollouts by central differences, the thesis's method, without repeating what a change cannot reach."""
 
 import numpy as np
-from numba import njit
 
 from dlm.simulator.commands import Commands, command
+from dlm.simulator.kernels import borrowing, compiled
 from dlm.simulator.rollout import (
     DONE,
     Item,
     Plans,
     Run,
     acceptable,
-    advance,
+    advance_alike,
+    copy_state,
     execute,
     item_of,
     run_of_plans,
@@ -23,7 +24,7 @@ POSITION, FORCE = 0, 1
 """First index of the entries of a plan."""
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled(nogil=True)
 def difference_batch(
     scenes: SceneArrays, plans: Plans, settings: np.record, adjoint: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -37,14 +38,14 @@ def difference_batch(
             continue
         table = table_of(item, settings)
         if execute(item, table, base) == DONE:
-            moved.motion.parts[:] = (
-                base.motion.parts
-            )  # cutting steps elsewhere would look like a change of the motion
+            # Cutting steps elsewhere would look like a change of the motion.
+            for i in range(len(base.motion.parts)):
+                moved.motion.parts[i] = base.motion.parts[i]
             _differentiate(item, table, settings, adjoint[b], (base, moved), gradient[b])
-    return gradient[:, POSITION].copy(), gradient[:, FORCE].copy()
+    return gradient[:, POSITION], gradient[:, FORCE]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _differentiate(
     item: Item,
     table: Commands,
@@ -71,7 +72,7 @@ def _differentiate(
         gradient[which, t, c, d] = total / (2 * size)
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _change(
     item: Item, table: Commands, c: int, runs: tuple[Run, Run], substeps: int, adjoint: np.ndarray
 ) -> float:
@@ -80,7 +81,7 @@ def _change(
     command(table, item.positions, item.forces, item.world.stiffness, moved.motion.commands)
     first = _restart(item, table, c, base, moved)
     if first < len(moved.motion.parts):
-        advance(item.world, moved, first, False)
+        advance_alike(item.world, moved, first)
     total = 0.0
     for k in range(first // substeps + 1, len(adjoint)):
         for e in range(3):
@@ -90,7 +91,7 @@ def _change(
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def acts_alike(table: Commands, t: int, c: int) -> bool:
     """Whether force and position of finger c at knot t move the commands alike, and the start not at all."""
     for i in range(len(table.knot)):
@@ -103,7 +104,7 @@ def acts_alike(table: Commands, t: int, c: int) -> bool:
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _restart(item: Item, table: Commands, c: int, base: Run, moved: Run) -> int:
     """Substep from which the changed commands of finger c act, with the state there copied from the unchanged motion.
 
@@ -112,15 +113,26 @@ def _restart(item: Item, table: Commands, c: int, base: Run, moved: Run) -> int:
     S, old, new = len(base.motion.parts), base.motion, moved.motion
     start_motion(item, table, new)
     first, last = 0, S
-    if (new.fingers[0] == old.fingers[0]).all() and (new.commands[0] == old.commands[0]).all():
-        while first < S and (old.commands[first + 1] == new.commands[first + 1]).all():
+    if _same(new.fingers[0], old.fingers[0]) and _same(new.commands[0], old.commands[0]):
+        while first < S and _same(old.commands[first + 1], new.commands[first + 1]):
             first += 1
-    while last > first and (old.commands[last] == new.commands[last]).all():
+    while last > first and _same(old.commands[last], new.commands[last]):
         last -= 1
     # A free finger, which has no mass, goes with its command: nothing is left of the change where that has none.
-    if not old.near[first : min(last + 1, S), c].any():
+    near = False
+    for i in range(first, min(last + 1, S)):
+        near |= old.near[i, c]
+    if not near:
         return S
     if first > 0:
-        new.poses[first], new.velocities[first] = old.poses[first], old.velocities[first]
-        new.fingers[first] = old.fingers[first]
+        copy_state(old, first, new, first)
     return first
+
+
+@borrowing
+def _same(a: np.ndarray, b: np.ndarray) -> bool:
+    """Whether all fingers are at the same places, (C, 2) each."""
+    for c in range(len(a)):  # noqa: SIM110  (numba knows no generators here)
+        if a[c, 0] != b[c, 0] or a[c, 1] != b[c, 1]:
+            return False
+    return True

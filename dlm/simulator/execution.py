@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from dlm.simulator.commands import Commands, commands_for
 from dlm.simulator.contact import VERTEX, nearest
+from dlm.simulator.kernels import borrowing, compiled, inlined
 from dlm.simulator.path import desired_motion
 from dlm.simulator.world import World
 
@@ -21,7 +21,7 @@ class Place(NamedTuple):
     bump_b: float
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def plan_commands(
     world: World, path: np.ndarray, positions: np.ndarray, loaded: np.ndarray, settings: np.record
 ) -> Commands:
@@ -30,7 +30,10 @@ def plan_commands(
     motion = desired_motion(path, np.sqrt(world.inertia / world.mass), settings)
     table = commands_for(len(motion), T, C)
     if settings.material_point:
-        table.frame[:], table.knot_frame[:] = motion, path
+        for i, d in np.ndindex((len(motion), 3)):
+            table.frame[i, d] = motion[i, d]
+        for t, d in np.ndindex((T, 3)):
+            table.knot_frame[t, d] = path[t, d]
     for c in range(C):
         for t in range(T):
             table.lift[t, c], table.slope[t, c], table.bend[t, c] = _stand_off(
@@ -50,7 +53,7 @@ def plan_commands(
     return table
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _stand(table: Commands, i: int, c: int, place: Place, roll: tuple[float, float]) -> None:
     """Knots, weights and offset of finger c at substep i."""
     a, b, w = place.a, place.b, place.share
@@ -66,7 +69,7 @@ def _stand(table: Commands, i: int, c: int, place: Place, roll: tuple[float, flo
     offset[1] -= roll_a * n[0] + roll_b * m[0]
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _stand_off(
     world: World,
     pose: np.ndarray,
@@ -98,7 +101,7 @@ def _stand_off(
     return lift, slope, (lift / distance if at_vertex else 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _place(loaded: np.ndarray, k: int, u: float, settings: np.record) -> Place:
     """Where a finger with flags (T,) is at share u of interval k."""
     if loaded[k]:
@@ -116,7 +119,7 @@ def _place(loaded: np.ndarray, k: int, u: float, settings: np.record) -> Place:
     return Place(a, b, x * x * (3 - 2 * x), bump if release else 0.0, bump if approach else 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _push(
     loaded: np.ndarray, c: int, k: int, u: float, settings: np.record
 ) -> tuple[tuple[int, int], tuple[float, float]]:
@@ -145,7 +148,7 @@ def _push(
     return (k, k + 1), (1 - share, share)
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _late(u: float, span: float) -> float:
     """Ramp from 0 to 1 over the last `span` of an interval."""
     if u >= 1:
@@ -153,19 +156,19 @@ def _late(u: float, span: float) -> float:
     return max(u - (1 - span), 0.0) / span if span > 0 else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _leaves(loaded: np.ndarray, k: int) -> bool:
     """Whether some finger pushes for the last time in interval k."""
     return _changes(loaded[k], loaded[k + 1])
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _arrives(loaded: np.ndarray, k: int) -> bool:
     """Whether some finger pushes for the first time at the end of interval k."""
     return _changes(loaded[k + 1], loaded[k])
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _changes(now: np.ndarray, then: np.ndarray) -> bool:
     """Whether some flag is set now and not then."""
     for c in range(len(now)):  # noqa: SIM110  (numba knows no generators here)
@@ -174,7 +177,7 @@ def _changes(now: np.ndarray, then: np.ndarray) -> bool:
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _roll(loaded: np.ndarray, path: np.ndarray, pose: np.ndarray, t: int, settings: np.record) -> float:
     """Distance that a round finger rolls along the facet since its contact began."""
     if not settings.rolling or not loaded[t]:

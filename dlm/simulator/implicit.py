@@ -1,10 +1,10 @@
 """Derivatives of rollouts in one backward sweep over their steps."""
 
 import numpy as np
-from numba import njit
 
 from dlm.simulator.adjoint import adjoint_step
 from dlm.simulator.commands import pull_back
+from dlm.simulator.kernels import compiled
 from dlm.simulator.rollout import (
     DONE,
     Item,
@@ -22,7 +22,7 @@ from dlm.simulator.scene import SceneArrays
 from dlm.simulator.world import State, World
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled(nogil=True)
 def implicit_batch(
     scenes: SceneArrays, plans: Plans, settings: np.record, adjoint: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -45,7 +45,7 @@ def implicit_batch(
     return d_positions, d_forces
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _sweep_back(
     item: Item, run: Run, adjoint: np.ndarray, substeps: int, command_bar: np.ndarray
 ) -> np.ndarray:
@@ -64,7 +64,7 @@ def _sweep_back(
     return bar.fingers.reshape((1, *motion.fingers.shape[1:]))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _sweep_back_parts(world: World, run: Run, i: int, bar: State, command_bar: np.ndarray) -> None:
     """The same for a step that was cut: its parts once more, and then back."""
     motion, fine, work = run

@@ -1,8 +1,8 @@
 """What a recorded motion did at every step: contacts and their forces, work of the fingers, and the laws of mechanics."""
 
 import numpy as np
-from numba import njit
 
+from dlm.simulator.kernels import borrowing, compiled
 from dlm.simulator.modes import MOST_CONTACTS, has_other_solutions
 from dlm.simulator.problem import relative_velocity
 from dlm.simulator.rollout import Motion, Run, load_parts, move
@@ -19,7 +19,7 @@ LAWS = np.dtype([("momentum", "f8"), ("cone", "f8"), ("several", "i8"), ("unchec
 solutions too, and steps with too many contacts to look for them."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def trace(world: World, run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Contacts (n,) of TRACE, (1,) of LAWS, and work of the fingers (S,), of a motion that was run.
 
@@ -43,7 +43,7 @@ def trace(world: World, run: Run) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return out[:count], laws, finger_work
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _check(world: World, motion: Motion, j: int, work: Work, laws: np.record) -> int:
     """Solve step j once more and hold it against the laws; the number of contacts."""
     before = State(motion.poses[j], motion.velocities[j], motion.fingers[j])
@@ -59,7 +59,7 @@ def _check(world: World, motion: Motion, j: int, work: Work, laws: np.record) ->
     return n
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _note_contact(k: int, world: World, before: np.ndarray, work: Work, out: np.record) -> float:
     """Fill the record of contact k; its finger's work on the object, whose velocity was `before`, during the step."""
     contact, f = work.problem.contacts[k], work.problem.contacts[k].finger
@@ -77,7 +77,7 @@ def _note_contact(k: int, world: World, before: np.ndarray, work: Work, out: np.
     return world.h * (out.fx * mid[0] + out.fy * mid[1] + turn * mid[2])
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _momentum(n: int, world: World, before: State, commands: np.ndarray, work: Work) -> float:
     """Violation of Newton's law for object (support plane aside) and fingers, moments over the radius of gyration [N]."""
     h, v, after, p = world.h, before.velocity, work.velocity, before.fingers
@@ -108,7 +108,7 @@ def _momentum(n: int, world: World, before: State, commands: np.ndarray, work: W
     return largest if world.support > 0 else max(largest, np.abs(net).max() / h)
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _cone(n: int, k: int, world: World, work: Work) -> float:
     """Violation of signs, friction cone and complementarity by contact k, as a force [N]."""
     normal, tangent = work.problem.rows[2 * k].P, work.problem.rows[2 * k + 1].P

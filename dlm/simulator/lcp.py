@@ -4,8 +4,8 @@ Where that fails, because friction is large, Lemke's method finds the states, or
 """
 
 import numpy as np
-from numba import njit
 
+from dlm.simulator.kernels import borrowing, inlined
 from dlm.simulator.lemke import lemke
 from dlm.simulator.modes import find_mode
 from dlm.simulator.problem import (
@@ -25,7 +25,7 @@ SWEEPS = np.array([4, 8, 40])
 NEWTON = 6
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def solve_contacts(n: int, problem: Problem) -> bool:
     """Solve for the impulses and states; False where rounding defeats every method, with the impulses of the sweeps."""
     rows = problem.rows
@@ -48,7 +48,7 @@ def solve_contacts(n: int, problem: Problem) -> bool:
     return False
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def sweep(n: int, problem: Problem, sweeps: int) -> None:
     """Projected Gauss-Seidel, contact by contact."""
     m, contacts, rows, A = 2 * n, problem.contacts, problem.rows, problem.A
@@ -68,7 +68,7 @@ def sweep(n: int, problem: Problem, sweeps: int) -> None:
                     rows[r].P = min(max(p, -limit), limit)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def guess_states(n: int, problem: Problem) -> None:
     """Read the states off the impulses."""
     contacts, rows = problem.contacts, problem.rows
@@ -85,7 +85,7 @@ def guess_states(n: int, problem: Problem) -> None:
             contacts[i].state = STICK
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def settle(n: int, problem: Problem) -> bool:
     """Newton's method: solve the equations of the states and correct these until they agree with the solution."""
     rows = problem.rows

@@ -12,8 +12,8 @@ So a step always has an answer; with much friction it may have several (Painleve
 """
 
 import numpy as np
-from numba import njit
 
+from dlm.simulator.kernels import borrowing, compiled
 from dlm.simulator.problem import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, Problem
 
 PIVOTS = 50
@@ -24,7 +24,7 @@ TIE = 1e-9
 """As z0 vanishes, so do y_+ and y_- of every contact that sticks: z0 leaves first where it is among the first up to rounding."""
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def lemke(n: int, problem: Problem) -> bool:
     """Set the states of n contacts to those of a solution; False where rounding or PIVOTS stop the method."""
     table, basis = _tableau(n, problem), np.arange(4 * n)
@@ -43,7 +43,7 @@ def lemke(n: int, problem: Problem) -> bool:
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _tableau(n: int, problem: Problem) -> np.ndarray:
     """Rows y - M z - z0 = q, columns y (4 n), z (4 n), z0, q; impulses in units that make A's diagonal about 1."""
     contacts, rows, A, _ = problem
@@ -69,7 +69,7 @@ def _tableau(n: int, problem: Problem) -> np.ndarray:
     return table
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _lowest(table: np.ndarray, size: int) -> int:
     """The row that z0 must lift first; of equal ones the last, which is lexicographically the lowest."""
     row = 0
@@ -79,7 +79,7 @@ def _lowest(table: np.ndarray, size: int) -> int:
     return row
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _pivot(table: np.ndarray, row: int, column: int) -> None:
     """Make a column a unit vector."""
     pivot = table[row]
@@ -89,7 +89,7 @@ def _pivot(table: np.ndarray, row: int, column: int) -> None:
             table[r] -= table[r, column] * pivot
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _blocking(table: np.ndarray, basis: np.ndarray, entering: int, size: int) -> int:
     """Row that reaches 0 first as a column enters, -1 if none does; z0's where it is among them, else by lexicographic order."""
     best = -1
@@ -106,7 +106,7 @@ def _blocking(table: np.ndarray, basis: np.ndarray, entering: int, size: int) ->
     return best
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _before(table: np.ndarray, r: int, s: int, entering: int, size: int) -> bool:
     """Whether row r over its pivot is lexicographically less than row s over its own: right-hand side, then the inverse basis."""
     a, b = table[r, entering], table[s, entering]
@@ -118,7 +118,7 @@ def _before(table: np.ndarray, r: int, s: int, entering: int, size: int) -> bool
     return difference < 0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _read_states(n: int, problem: Problem, basis: np.ndarray) -> None:
     """States of the contacts from the variables that are not 0."""
     contacts, size = problem.contacts, 4 * n

@@ -1,8 +1,8 @@
 """All modes of a contact problem: to find a solution where nothing else does, or others than the one that was found."""
 
 import numpy as np
-from numba import njit
 
+from dlm.simulator.kernels import borrowing, compiled
 from dlm.simulator.problem import Problem, correct_states, expand, reduced_system, solve_linear
 
 MOST_CONTACTS = 4
@@ -13,7 +13,7 @@ SAME = 1e-6
 """Impulses that differ by less, of the largest, are the same."""
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def find_mode(n: int, problem: Problem) -> None:
     """Set the states of up to MOST_TO_SOLVE contacts to the first mode whose equations have a solution within the laws."""
     for mode in range(4**n if n <= MOST_TO_SOLVE else 0):
@@ -23,13 +23,13 @@ def find_mode(n: int, problem: Problem) -> None:
             return
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _set_states(n: int, problem: Problem, mode: int) -> None:
     for i in range(n):
         problem.contacts[i].state = mode // 4**i % 4
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def has_other_solutions(n: int, problem: Problem) -> bool:
     """Whether another mode has a solution that differs (with much friction one may: Painleve); impulses and states of the solution that was found stay."""
     contacts, rows, _, _ = problem
@@ -47,7 +47,7 @@ def has_other_solutions(n: int, problem: Problem) -> bool:
     return other
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _solves(n: int, problem: Problem) -> bool:
     """Whether the equations of the states have a solution that keeps signs and cones."""
     size = reduced_system(n, problem, False)

@@ -1,10 +1,11 @@
 """The object's desired motion between the knots of a plan."""
 
 import numpy as np
-from numba import njit
+
+from dlm.simulator.kernels import borrowing, compiled
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def desired_motion(path: np.ndarray, size: float, settings: np.record) -> np.ndarray:
     """Poses (S + 1, 3) along a path (T, 3): constant-twist screws, run through without stops but for corners.
 
@@ -17,7 +18,7 @@ def desired_motion(path: np.ndarray, size: float, settings: np.record) -> np.nda
         d = path[k + 1] - path[k]
         lengths[k] = np.sqrt(d[0] ** 2 + d[1] ** 2 + (size * d[2]) ** 2)
     slope = _knot_speeds(path, lengths, size)
-    out[0] = path[0]
+    out[0, 0], out[0, 1], out[0, 2] = path[0, 0], path[0, 1], path[0, 2]
     for k in range(T - 1):
         for i in range(1, settings.substeps + 1):
             u = i / settings.substeps
@@ -29,7 +30,7 @@ def desired_motion(path: np.ndarray, size: float, settings: np.record) -> np.nda
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def _knot_speeds(path: np.ndarray, lengths: np.ndarray, size: float) -> np.ndarray:
     """Path length per interval at the knots: harmonic means (monotone cubics), slowed down in corners, 0 at the ends."""
     T = len(path)
@@ -43,7 +44,7 @@ def _knot_speeds(path: np.ndarray, lengths: np.ndarray, size: float) -> np.ndarr
     return speed
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def screw(start: np.ndarray, stop: np.ndarray, s: float, out: np.ndarray) -> None:
     """Pose at share s of the constant-twist motion between two poses."""
     turn = stop[2] - start[2]

@@ -7,9 +7,9 @@ In a known state of every contact these are linear equations.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from dlm.simulator.contact import CONTACT
+from dlm.simulator.kernels import compiled, inlined
 
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS = 0, 1, 2, 3
 """State of a contact: P = 0; y = 0; y_n = 0 and P_t = +mu P_n or -mu P_n."""
@@ -33,7 +33,7 @@ class Problem(NamedTuple):
     B: np.ndarray
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def problem_for(size: int) -> Problem:
     """Memory for at most so many contacts."""
     return Problem(
@@ -44,7 +44,7 @@ def problem_for(size: int) -> Problem:
     )
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def reduced_system(n: int, problem: Problem, transposed: bool) -> int:
     """Rows and columns of the active set into B, its part of c into the right-hand sides; return the size.
 
@@ -76,7 +76,7 @@ def reduced_system(n: int, problem: Problem, transposed: bool) -> int:
     return row
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def expand(n: int, problem: Problem) -> None:
     """Impulses P from the reduced solution in the right-hand sides."""
     contacts, rows = problem.contacts, problem.rows
@@ -97,7 +97,7 @@ def expand(n: int, problem: Problem) -> None:
         row += 1
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def relative_velocity(n: int, problem: Problem, r: int) -> float:
     """y = A P + c in row r."""
     y = problem.rows[r].c
@@ -106,7 +106,7 @@ def relative_velocity(n: int, problem: Problem, r: int) -> float:
     return y
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def solve_linear(B: np.ndarray, rows: np.ndarray, size: int) -> bool:
     """Gaussian elimination with partial pivoting, in place; False for a singular matrix."""
     for k in range(size):
@@ -133,7 +133,7 @@ def solve_linear(B: np.ndarray, rows: np.ndarray, size: int) -> bool:
     return True
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def correct_states(n: int, problem: Problem) -> bool:
     """Flip the states that contradict the impulses; return whether any did."""
     contacts, rows, A, _ = problem

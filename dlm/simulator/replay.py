@@ -183,7 +183,7 @@ def follow(world: World, run: Run) -> bool:
 
     Raises SolverFailed where rounding made a contact problem unsolvable.
     """
-    end = advance(world, run, 0, True)
+    end = advance(world, run)
     if end == UNSOLVED:
         raise SolverFailed(UNSOLVED_STEP)
     return end == DONE

@@ -6,10 +6,10 @@ Scenes are simulated one after the other by the same compiled code, so that a ba
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from dlm.simulator.commands import Commands, command
 from dlm.simulator.execution import plan_commands
+from dlm.simulator.kernels import borrowing, compiled
 from dlm.simulator.problem import ROWS
 from dlm.simulator.scene import SceneArrays
 from dlm.simulator.step import Work, coasts, solve_step, work_for
@@ -67,7 +67,7 @@ class Item(NamedTuple):
     start: np.ndarray
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def motion_for(samples: int, fingers: int) -> Motion:
     """Empty states."""
     return Motion(
@@ -80,80 +80,95 @@ def motion_for(samples: int, fingers: int) -> Motion:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def run_for(scenes: SceneArrays, samples: int, fingers: int) -> Run:
     """Memory for any scene of a batch."""
     work = work_for(fingers, scenes.walls.shape[1], scenes.facets.shape[1])
     return Run(motion_for(samples, fingers), motion_for(MOST_PARTS + 1, fingers), work)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def run_of_plans(scenes: SceneArrays, plans: Plans, settings: np.record) -> Run:
     """Memory for any plan of a batch."""
     _, T, C = plans.loaded.shape
     return run_for(scenes, (T - 1) * settings.substeps + 1, C)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def item_of(scenes: SceneArrays, plans: Plans, b: int, settings: np.record) -> Item:
     """Scene and plan b."""
     world, path = world_of(scenes, b, settings), scenes.path[b]
     return Item(world, path, plans.positions[b], plans.forces[b], plans.loaded[b], plans.start[b])
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def table_of(item: Item, settings: np.record) -> Commands:
     """How the commands depend on the plan."""
     return plan_commands(item.world, item.path, item.positions, item.loaded, settings)
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def acceptable(item: Item) -> bool:
     """Whether a plan is made of finite numbers that leave room to compute with."""
-    return np.abs(item.positions).max() < 1e100 and np.abs(item.forces).max() < 1e100
+    T, C = item.loaded.shape
+    for t, c, d in np.ndindex((T, C, 2)):
+        if not (abs(item.positions[t, c, d]) < 1e100 and abs(item.forces[t, c, d]) < 1e100):
+            return False
+    return True
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def execute(item: Item, table: Commands, run: Run) -> int:
     """Commands and motion of one plan; how it ended."""
     command(table, item.positions, item.forces, item.world.stiffness, run.motion.commands)
     start_motion(item, table, run.motion)
-    return advance(item.world, run, 0, True)
+    return advance(item.world, run)
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def start_motion(item: Item, table: Commands, motion: Motion) -> None:
     """Object at rest at its first pose, fingers where the plan has them."""
-    motion.poses[0], motion.velocities[0] = item.start, 0
+    for d in range(3):
+        motion.poses[0, d], motion.velocities[0, d] = item.start[d], 0
     command(table, item.positions, item.forces, np.inf, motion.fingers[:1])
 
 
-@njit(cache=True, error_model="numpy")
-def advance(world: World, run: Run, start: int, adapt: bool) -> int:
-    """Continue the motion from substep `start` under its commands; DONE, or how it ended, with the last state held for good.
+@borrowing
+def advance(world: World, run: Run) -> int:
+    """Motion from its first state under its commands; DONE, or how it ended, with the last state held for good.
 
-    Steps are cut into as many parts as their error asks for, or, without `adapt`, as the motion says.
+    Steps are cut into as many parts as their error asks for.
     """
     motion, _, work = run
-    for i in range(start, len(motion.commands) - 1):
+    for i in range(len(motion.parts)):
         motion.near[i, :] = False
-        if adapt:
-            motion.parts[i] = 1
-        end = DONE
-        if motion.parts[i] == 1:
-            end, error = move(world, motion, i, motion.near[i], work)
-            while adapt and error > world.step_error and motion.parts[i] < MOST_PARTS:
-                motion.parts[i] = _enough_parts(motion.parts[i], error / world.step_error)
-                end, error = move_in_parts(world, run, i)
-        else:
-            end, _ = move_in_parts(world, run, i)
+        motion.parts[i] = 1
+        end, error = move(world, motion, i, motion.near[i], work)
+        while error > world.step_error and motion.parts[i] < MOST_PARTS:
+            motion.parts[i] = _enough_parts(motion.parts[i], error / world.step_error)
+            end, error = move_in_parts(world, run, i)
         if end != DONE:
             hold(motion, i)
             return end
     return DONE
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
+def advance_alike(world: World, run: Run, start: int) -> None:
+    """The same from substep `start`, with steps cut into the parts that the motion has already."""
+    motion, _, work = run
+    for i in range(start, len(motion.parts)):
+        motion.near[i, :] = False
+        if motion.parts[i] == 1:
+            end, _ = move(world, motion, i, motion.near[i], work)
+        else:
+            end, _ = move_in_parts(world, run, i)
+        if end != DONE:
+            hold(motion, i)
+            return
+
+
+@borrowing
 def _enough_parts(parts: int, excess: float) -> int:
     """More parts than before, a power of two: the error falls with their number."""
     while excess > 1 and parts < MOST_PARTS:
@@ -161,7 +176,7 @@ def _enough_parts(parts: int, excess: float) -> int:
     return parts
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@borrowing
 def move(world: World, motion: Motion, i: int, near: np.ndarray, work: Work) -> tuple[int, float]:
     """Step i in one go; how it ended, and an estimate of its error [m].  Sets flags near (C,) of fingers in contact problems.
 
@@ -196,7 +211,7 @@ def move(world: World, motion: Motion, i: int, near: np.ndarray, work: Work) -> 
     return DONE if exact else UNSOLVED, error
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def move_in_parts(world: World, run: Run, i: int) -> tuple[int, float]:
     """Step i in as many parts as the motion says; how it ended, and an estimate of its error [m]."""
     motion, fine, work = run
@@ -207,18 +222,16 @@ def move_in_parts(world: World, run: Run, i: int) -> tuple[int, float]:
         total += error
         if end != DONE:
             return end, total
-    motion.poses[i + 1], motion.velocities[i + 1] = fine.poses[parts], fine.velocities[parts]
-    motion.fingers[i + 1] = fine.fingers[parts]
+    copy_state(fine, parts, motion, i + 1)
     return DONE, total
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def load_parts(world: World, run: Run, i: int) -> World:
     """State and commands of step i into the finer motion; the world whose step is one of its parts."""
     motion, fine, _ = run
     parts = motion.parts[i]
-    fine.poses[0], fine.velocities[0] = motion.poses[i], motion.velocities[i]
-    fine.fingers[0] = motion.fingers[i]
+    copy_state(motion, i, fine, 0)
     for j in range(parts + 1):
         s = j / parts
         for c in range(fine.commands.shape[1]):
@@ -227,15 +240,23 @@ def load_parts(world: World, run: Run, i: int) -> World:
     return with_step(world, world.h / parts)
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def hold(motion: Motion, i: int) -> None:
     """State i for the rest of the motion."""
     for j in range(i + 1, len(motion.poses)):
-        motion.poses[j], motion.velocities[j] = motion.poses[i], motion.velocities[i]
-        motion.fingers[j] = motion.fingers[i]
+        copy_state(motion, i, motion, j)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@borrowing
+def copy_state(source: Motion, i: int, target: Motion, j: int) -> None:
+    """State i of a motion becomes state j of another."""
+    for d in range(3):
+        target.poses[j, d], target.velocities[j, d] = source.poses[i, d], source.velocities[i, d]
+    for c in range(source.fingers.shape[1]):
+        target.fingers[j, c, 0], target.fingers[j, c, 1] = source.fingers[i, c, 0], source.fingers[i, c, 1]
+
+
+@compiled(nogil=True)
 def execute_batch(scenes: SceneArrays, plans: Plans, settings: np.record) -> tuple[np.ndarray, np.ndarray]:
     """Poses at the knots (B, T, 3), and how each motion ended (B,).
 
@@ -246,8 +267,10 @@ def execute_batch(scenes: SceneArrays, plans: Plans, settings: np.record) -> tup
     run = run_of_plans(scenes, plans, settings)
     for b in range(B):
         item = item_of(scenes, plans, b, settings)
-        poses[b, :] = item.start
+        for t, d in np.ndindex((T, 3)):
+            poses[b, t, d] = item.start[d]
         if acceptable(item):
             ends[b] = execute(item, table_of(item, settings), run)
-            poses[b] = run.motion.poses[:: settings.substeps]
+            for t, d in np.ndindex((T, 3)):
+                poses[b, t, d] = run.motion.poses[t * settings.substeps, d]
     return poses, ends

@@ -6,17 +6,16 @@
 A finger at p is a massless spring k with damper d that follows its command, from u to u+, at velocity w; P / h is its force
 on the object.  The relative velocity J v+ - w at every contact and the impulses P solve the contact problem.
 
-A step takes a microsecond.  Numba counts references of every array that a call passes, so the small functions of the
-inner loop are inlined; that halves the time.
+A step takes a microsecond: see `kernels`.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from dlm.simulator import support
 from dlm.simulator.contact import Moment, activation, collect
+from dlm.simulator.kernels import borrowing, compiled, inlined
 from dlm.simulator.lcp import solve_contacts
 from dlm.simulator.problem import OPEN, Problem, problem_for
 from dlm.simulator.world import State, World
@@ -32,6 +31,8 @@ class Work(NamedTuple):
 
     mobility (3, 3): velocity per impulse.  Velocities of the object (3,): predicted without any forces
     but gravity, free of contacts, and at the end of the step; of the fingers (C, 2): free of contacts, and at the end.
+    With friction of the support: resistance (3, 3) and momentum (3,), resistance v = momentum + impulses; the velocity that
+    was guessed (3,), and directions (V, 2) that the friction opposes.
     """
 
     problem: Problem
@@ -41,9 +42,13 @@ class Work(NamedTuple):
     velocity: np.ndarray
     finger_free: np.ndarray
     finger_velocity: np.ndarray
+    resistance: np.ndarray
+    momentum: np.ndarray
+    guess: np.ndarray
+    directions: np.ndarray
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def work_for(fingers: int, walls: int, vertices: int) -> Work:
     """Scratch memory for scenes with at most so many: a finger touches two facets of a corner, a wall any vertex."""
     return Work(
@@ -54,10 +59,14 @@ def work_for(fingers: int, walls: int, vertices: int) -> Work:
         np.zeros(3),
         np.zeros((fingers, 2)),
         np.zeros((fingers, 2)),
+        np.zeros((3, 3)),
+        np.zeros(3),
+        np.zeros(3),
+        np.zeros((vertices, 2)),
     )
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def solve_step(world: World, state: State, commands: np.ndarray, work: Work) -> tuple[int, bool]:
     """Velocities at the end of the step, into work.velocity and work.finger_velocity.
 
@@ -84,7 +93,7 @@ def solve_step(world: World, state: State, commands: np.ndarray, work: Work) -> 
     return n, _solve_velocities(n, world, work)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def coasts(n: int, world: World, before: State, work: Work) -> bool:
     """Whether gravity alone acts in the step that was solved, and would if the mean of both velocities moved the object."""
     if world.support > 0:
@@ -99,7 +108,7 @@ def coasts(n: int, world: World, before: State, work: Work) -> bool:
     return True
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _contact_rows(n: int, q: np.ndarray, problem: Problem) -> None:
     """Contact Jacobian: row 2 i is the normal direction of contact i, row 2 i + 1 the normal turned by +90 degrees."""
     contacts, rows = problem.contacts, problem.rows
@@ -111,7 +120,7 @@ def _contact_rows(n: int, q: np.ndarray, problem: Problem) -> None:
         tangent.x, tangent.y, tangent.turn = -ny, nx, ax * nx + ay * ny
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def softness(gap: float, kappa: float, regularization: float) -> float:
     """Compliance of a contact over its scale: (1 - a) / a for activation a (Thesis 4-CT9), never below the floor."""
     if np.isinf(kappa):
@@ -120,7 +129,7 @@ def softness(gap: float, kappa: float, regularization: float) -> float:
     return regularization + (1 - a) / a
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def bias(gap: float, h: float, kappa: float) -> float:
     """Velocity that the normal row adds: what closes an open gap, or what removes a share of a penetration."""
     if gap < -SHALLOW:
@@ -128,26 +137,26 @@ def bias(gap: float, h: float, kappa: float) -> float:
     return gap / h if gap < 0 or np.isinf(kappa) else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def finger_mobility(world: World) -> float:
     """Velocity of a finger per impulse on it."""
     return 1 / (world.h * (world.stiffness * world.h + world.damping))
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def spring_rates(world: World) -> tuple[float, float]:
     """Velocity of a free finger per distance to its command, and per distance that the command goes in the step."""
     resistance = world.stiffness * world.h + world.damping
     return world.stiffness / resistance, world.damping / (resistance * world.h)
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def contact_scale(world: World, lever: float, give: float) -> float:
     """What a row would have on the diagonal of A for a free object: the unit of the contact's compliance."""
     return 1 / world.mass + lever * lever / world.inertia + give
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def assemble_problem(n: int, world: World, work: Work) -> None:
     """A = J W J^T + finger mobility + compliance and c = relative velocity without impulses + bias."""
     contacts, rows, A, _ = work.problem
@@ -172,7 +181,7 @@ def assemble_problem(n: int, world: World, work: Work) -> None:
         row.c = c if r % 2 == 1 else c + bias(contact.gap, world.h, world.kappa)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _solve_velocities(n: int, world: World, work: Work) -> bool:
     """Solve the contact problem and apply its impulses."""
     exact = True
@@ -183,13 +192,14 @@ def _solve_velocities(n: int, world: World, work: Work) -> bool:
     return exact
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _apply_impulses(n: int, world: World, work: Work) -> None:
     """Velocities of object and fingers from the impulses."""
     contacts, rows, _, _ = work.problem
     velocity, free, finger_velocity = work.velocity, work.free, work.finger_velocity
     give = finger_mobility(world)
-    finger_velocity[:] = work.finger_free
+    for c in range(len(finger_velocity)):
+        finger_velocity[c, 0], finger_velocity[c, 1] = work.finger_free[c, 0], work.finger_free[c, 1]
     x, y, turn = 0.0, 0.0, 0.0
     for r in range(2 * n):
         row, f = rows[r], contacts[r // 2].finger
@@ -204,30 +214,31 @@ def _apply_impulses(n: int, world: World, work: Work) -> None:
         velocity[k] = free[k] + W[k, 0] * x + W[k, 1] * y + W[k, 2] * turn
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def _with_support(n: int, world: World, state: State, work: Work) -> bool:
     """Contacts and support friction together, by Newton steps in velocity and friction."""
-    guess = work.predicted.copy()
-    w = support.directions(world, state.pose, guess)
+    for d in range(3):
+        work.guess[d] = work.predicted[d]
+    support.directions(world, state.pose, work.guess, work.directions)
     exact = True
     for _ in range(support.ITERATIONS):
-        support_mobility(world, state, guess, w, work)
+        support_mobility(world, state, work)
         exact = _solve_velocities(n, world, work)
-        change = support.update_directions(world, state.pose, guess, work.velocity, w)
-        guess[:] = work.velocity
+        change = support.update_directions(world, state.pose, work.guess, work.velocity, work.directions)
+        for d in range(3):
+            work.guess[d] = work.velocity[d]
         if change < support.TOLERANCE:
             return exact
     return False
 
 
-@njit(cache=True, error_model="numpy")
-def support_mobility(world: World, state: State, guess: np.ndarray, w: np.ndarray, work: Work) -> None:
-    """Mobility and contact-free velocity with the support friction linearised at a velocity and its directions w."""
-    K, b, v = np.zeros((3, 3)), np.zeros(3), state.velocity
-    K[0, 0] = K[1, 1] = world.mass
-    K[2, 2] = world.inertia
-    b[0], b[1], b[2] = world.mass * v[0], world.mass * v[1], world.inertia * v[2]
-    support.linearise(world, state.pose, guess, w, K, b)
-    support.invert(K, work.mobility)
-    for i in range(3):
-        work.free[i] = work.mobility[i, 0] * b[0] + work.mobility[i, 1] * b[1] + work.mobility[i, 2] * b[2]
+@borrowing
+def support_mobility(world: World, state: State, work: Work) -> None:
+    """Mobility and contact-free velocity with the support friction linearised at the guess and its directions."""
+    W, b = work.mobility, work.momentum
+    for d in range(3):
+        b[d] = (world.inertia if d == 2 else world.mass) * state.velocity[d]
+    support.linearise(world, state.pose, work.guess, work.directions, (work.resistance, b))
+    support.invert(work.resistance, W)
+    for d in range(3):
+        work.free[d] = W[d, 0] * b[0] + W[d, 1] * b[1] + W[d, 2] * b[2]

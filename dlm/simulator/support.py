@@ -5,8 +5,8 @@ within the unit disc, lets Newton's method converge from afar.
 """
 
 import numpy as np
-from numba import njit
 
+from dlm.simulator.kernels import borrowing, inlined
 from dlm.simulator.world import World, vertex_arm
 
 CREEP = 1e-5
@@ -14,55 +14,59 @@ CREEP = 1e-5
 ITERATIONS, TOLERANCE = 60, 1e-13
 
 
-@njit(cache=True, error_model="numpy")
-def directions(world: World, pose: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-    """Directions w (V, 2) that the support friction opposes."""
+@borrowing
+def directions(world: World, pose: np.ndarray, velocity: np.ndarray, w: np.ndarray) -> None:
+    """Directions w, the first V of them (2,), that the support friction opposes."""
     facets = world.facets
-    w = np.zeros((len(facets), 2))
     cs, sn = np.cos(pose[2]), np.sin(pose[2])
-    for k in range(len(w)):
+    for k in range(len(facets)):
         rx, ry = vertex_arm(facets[k].x, facets[k].y, cs, sn)
         sx, sy = velocity[0] - ry * velocity[2], velocity[1] + rx * velocity[2]
         speed = np.sqrt(sx * sx + sy * sy + CREEP**2)
         w[k, 0], w[k, 1] = sx / speed, sy / speed
-    return w
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def linearise(
-    world: World, pose: np.ndarray, guess: np.ndarray, w: np.ndarray, K: np.ndarray, b: np.ndarray
+    world: World, pose: np.ndarray, guess: np.ndarray, w: np.ndarray, equation: tuple[np.ndarray, np.ndarray]
 ) -> None:
-    """Add the friction, linearised at a velocity and its directions w, to K v = b."""
-    S, D = np.zeros((2, 3)), np.zeros((2, 2))
+    """K v = b of the object with the friction, linearised at a velocity and its directions w; b holds its momentum.
+
+    A vertex at arm r has velocity S v, S = [1 0 -r_y; 0 1 r_x], and adds S^T D S to K.
+    """
+    K, b = equation
+    xx, xy, xt, yy, yt, tt = world.mass, 0.0, 0.0, world.mass, 0.0, world.inertia
     cs, sn = np.cos(pose[2]), np.sin(pose[2])
-    S[0, 0] = S[1, 1] = 1
     for k in range(len(world.facets)):
         rx, ry = vertex_arm(world.facets[k].x, world.facets[k].y, cs, sn)
-        S[0, 2], S[1, 2] = -ry, rx
         sx, sy = guess[0] - ry * guess[2], guess[1] + rx * guess[2]
         speed = np.sqrt(sx * sx + sy * sy + CREEP**2)
         viscous = world.h * world.support / speed
         wx, wy = w[k, 0], w[k, 1]
-        D[0, 0], D[1, 1] = viscous * (1 - wx * sx / speed), viscous * (1 - wy * sy / speed)
-        D[0, 1] = D[1, 0] = -0.5 * viscous * (wx * sy + wy * sx) / speed
-        fx = (D[0, 0] - viscous) * sx + D[0, 1] * sy
-        fy = D[1, 0] * sx + (D[1, 1] - viscous) * sy
-        for i in range(3):
-            b[i] += S[0, i] * fx + S[1, i] * fy
-            for j in range(3):
-                for d in range(2):
-                    for e in range(2):
-                        K[i, j] += S[d, i] * D[d, e] * S[e, j]
+        dx, dy = viscous * (1 - wx * sx / speed), viscous * (1 - wy * sy / speed)
+        d = -0.5 * viscous * (wx * sy + wy * sx) / speed
+        fx = (dx - viscous) * sx + d * sy
+        fy = d * sx + (dy - viscous) * sy
+        b[0] += fx
+        b[1] += fy
+        b[2] += -ry * fx + rx * fy
+        xx, xy, yy = xx + dx, xy + d, yy + dy
+        xt = xt - dx * ry + d * rx
+        yt = yt - d * ry + dy * rx
+        tt = tt + ry * dx * ry - ry * d * rx - rx * d * ry + rx * dy * rx
+    K[0, 0], K[0, 1], K[0, 2] = xx, xy, xt
+    K[1, 0], K[1, 1], K[1, 2] = xy, yy, yt
+    K[2, 0], K[2, 1], K[2, 2] = xt, yt, tt
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def update_directions(
     world: World, pose: np.ndarray, before: np.ndarray, after: np.ndarray, w: np.ndarray
 ) -> float:
     """Newton step of the directions w, drawn back into the unit disc; returns the largest change of a vertex velocity."""
     cs, sn = np.cos(pose[2]), np.sin(pose[2])
     largest = 0.0
-    for k in range(len(w)):
+    for k in range(len(world.facets)):
         rx, ry = vertex_arm(world.facets[k].x, world.facets[k].y, cs, sn)
         sx, sy = before[0] - ry * before[2], before[1] + rx * before[2]
         dx = after[0] - ry * after[2] - sx
@@ -77,7 +81,7 @@ def update_directions(
     return largest
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def turning_slope(world: World, pose: np.ndarray, z: np.ndarray, v: np.ndarray) -> float:
     """Derivative of the friction's impulse along z, at velocity v, with respect to the object's angle."""
     cs, sn = np.cos(pose[2]), np.sin(pose[2])
@@ -94,7 +98,7 @@ def turning_slope(world: World, pose: np.ndarray, z: np.ndarray, v: np.ndarray) 
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def invert(K: np.ndarray, out: np.ndarray) -> None:
     """Inverse of a symmetric positive definite (3, 3) matrix by cofactors."""
     for i in range(3):

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from dlm.simulator.kernels import borrowing, compiled
 from dlm.simulator.scene import SceneArrays
 
 
@@ -40,7 +40,7 @@ class State(NamedTuple):
     fingers: np.ndarray
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def world_of(scenes: SceneArrays, b: int, settings: np.record) -> World:
     """Scene b of a batch under settings, a record of NUMBERS."""
     mass, stiffness = scenes.mass[b], scenes.stiffness[b]
@@ -63,7 +63,7 @@ def world_of(scenes: SceneArrays, b: int, settings: np.record) -> World:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled
 def with_step(world: World, h: float) -> World:
     """The same scene with another time step."""
     return World(
@@ -85,7 +85,7 @@ def with_step(world: World, h: float) -> World:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@borrowing
 def vertex_arm(x: float, y: float, cs: float, sn: float) -> tuple[float, float]:
     """A vertex seen from the centre of mass, world frame, for cosine and sine of the object's angle."""
     return cs * x - sn * y, sn * x + cs * y
