@@ -90,13 +90,13 @@ def adjoint_step(
         if f >= 0:
             ends[f, 0] += w[r] * row.x
             ends[f, 1] += w[r] * row.y
-    back = Back(work.mobility @ end, ends, w)
+    back = Back(work.body[0].mobility @ end, ends, w)
     pose_bar = bar.pose.copy()
     for i in range(n):
         if rows[2 * i].P != 0 or w[2 * i] != 0:
             _adjoint_contact(i, world, state, back, bar, work)
     if world.support > 0:
-        bar.pose[2] += support.turning_slope(world, state.pose, back.z, work.velocity)
+        bar.pose[2] += support.turning_slope(world, state.pose, back.z, work.body[0].velocity)
     for d in range(3):
         bar.velocity[d] = (world.inertia if d == 2 else world.mass) * back.z[d] + early * pose_bar[d]
     follow, lead = spring_rates(world)
@@ -111,8 +111,8 @@ def adjoint_step(
 def _linearise_support(n: int, world: World, state: State, work: Work) -> None:
     """The contact problem with the support friction linearised at the velocity that was found."""
     for d in range(3):
-        work.guess[d] = work.velocity[d]
-    support.directions(world, state.pose, work.guess, work.directions)
+        work.body[0].guess[d] = work.body[0].velocity[d]
+    support.directions(world, state.pose, work.body[0].guess, work.directions)
     support_mobility(world, state, work)
     assemble_problem(n, world, work)
 
@@ -120,7 +120,7 @@ def _linearise_support(n: int, world: World, state: State, work: Work) -> None:
 @compiled
 def impulse_adjoint(n: int, world: World, end: np.ndarray, ends: np.ndarray, work: Work) -> np.ndarray:
     """Adjoints (2 n,) of the impulses, given those of the velocities of object (3,) and fingers (C, 2)."""
-    weighted, out, give = work.mobility @ end, np.zeros(2 * n), finger_mobility(world)
+    weighted, out, give = work.body[0].mobility @ end, np.zeros(2 * n), finger_mobility(world)
     contacts, rows, _, _ = work.problem
     for r in range(2 * n):
         row, f = rows[r], contacts[r // 2].finger
@@ -164,7 +164,7 @@ def row_multipliers(n: int, problem: Problem, adjoint: np.ndarray) -> np.ndarray
 def _adjoint_contact(i: int, world: World, state: State, back: Back, bar: State, work: Work) -> None:
     """Adjoint of contact i's rows, bias and compliance, then of its geometry."""
     contacts, rows, _, _ = work.problem
-    velocity, finger_velocity = work.velocity, work.finger_velocity
+    velocity, finger_velocity = work.body[0].velocity, work.finger_velocity
     z, ends, w = back
     contact = contacts[i]
     f, gap = contact.finger, contact.gap

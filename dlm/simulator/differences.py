@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dlm.simulator.commands import Commands, command
+from dlm.simulator.commands import Commands
 from dlm.simulator.kernels import borrowing, compiled
 from dlm.simulator.rollout import (
     DONE,
@@ -10,9 +10,9 @@ from dlm.simulator.rollout import (
     Plans,
     Run,
     acceptable,
+    advance,
     advance_alike,
     copy_state,
-    execute,
     item_of,
     run_of_plans,
     start_motion,
@@ -37,7 +37,8 @@ def difference_batch(
         if not acceptable(item):
             continue
         table = table_of(item, settings)
-        if execute(item, table, base) == DONE:
+        start_motion(item, table, base.motion)
+        if advance(item.world, base) == DONE:
             # Cutting steps elsewhere would look like a change of the motion.
             for i in range(len(base.motion.parts)):
                 moved.motion.parts[i] = base.motion.parts[i]
@@ -78,7 +79,6 @@ def _change(
 ) -> float:
     """Change of the knot poses along their adjoint (T, 3) for an item of which the plan of finger c was changed."""
     base, moved = runs
-    command(table, item.positions, item.forces, item.world.stiffness, moved.motion.commands)
     first = _restart(item, table, c, base, moved)
     if first < len(moved.motion.parts):
         advance_alike(item.world, moved, first)

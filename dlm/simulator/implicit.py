@@ -11,11 +11,12 @@ from dlm.simulator.rollout import (
     Plans,
     Run,
     acceptable,
-    execute,
+    advance,
     item_of,
     load_parts,
     move,
     run_of_plans,
+    start_motion,
     table_of,
 )
 from dlm.simulator.scene import SceneArrays
@@ -35,7 +36,8 @@ def implicit_batch(
         if not acceptable(item):
             continue
         table = table_of(item, settings)
-        if execute(item, table, run) != DONE:
+        start_motion(item, table, run.motion)
+        if advance(item.world, run) != DONE:
             continue
         first = _sweep_back(item, run, adjoint[b], settings.substeps, command_bar)
         pull_back(table, command_bar, item.world.stiffness, d_positions[b], d_forces[b])

@@ -15,5 +15,7 @@ compiled = partial(_kernel, _nrt=True, forceinline=False)
 """For functions that make arrays, or return some."""
 borrowing = partial(_kernel, _nrt=False, forceinline=False)
 """For functions that work on their callers' arrays: they make none, and return none, nor tuples with arrays."""
-inlined = partial(_kernel, _nrt=False, forceinline=True)
-"""The same, for small ones of the inner loop: a call hands over every array of every tuple, one by one."""
+inlined = partial(_kernel, _nrt=False, forceinline=True, no_cpython_wrapper=True)
+"""The same, as a part of the machine code of whoever calls: a call hands over every array of every tuple, one by one.
+
+Python cannot call them."""

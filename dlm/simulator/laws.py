@@ -67,7 +67,7 @@ def _note_contact(k: int, world: World, before: np.ndarray, work: Work, out: np.
     out.finger, out.wall, out.gap, out.x, out.y = f, contact.wall, contact.gap, contact.x, contact.y
     out.fx = (normal.P * normal.x + tangent.P * tangent.x) / world.h
     out.fy = (normal.P * normal.y + tangent.P * tangent.y) / world.h
-    after = work.velocity
+    after = work.body[0].velocity
     out.slip = tangent.x * after[0] + tangent.y * after[1] + tangent.turn * after[2]
     if f < 0:
         return 0.0
@@ -80,7 +80,7 @@ def _note_contact(k: int, world: World, before: np.ndarray, work: Work, out: np.
 @compiled
 def _momentum(n: int, world: World, before: State, commands: np.ndarray, work: Work) -> float:
     """Violation of Newton's law for object (support plane aside) and fingers, moments over the radius of gyration [N]."""
-    h, v, after, p = world.h, before.velocity, work.velocity, before.fingers
+    h, v, after, p = world.h, before.velocity, work.body[0].velocity, before.fingers
     net = np.array([after[0] - v[0], after[1] - v[1] + h * world.gravity, after[2] - v[2]])
     net *= np.array([world.mass, world.mass, world.inertia])
     spring = np.zeros_like(p)

@@ -85,7 +85,7 @@ def guess_states(n: int, problem: Problem) -> None:
             contacts[i].state = STICK
 
 
-@inlined
+@borrowing
 def settle(n: int, problem: Problem) -> bool:
     """Newton's method: solve the equations of the states and correct these until they agree with the solution."""
     rows = problem.rows

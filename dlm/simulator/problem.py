@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dlm.simulator.contact import CONTACT
-from dlm.simulator.kernels import compiled, inlined
+from dlm.simulator.kernels import borrowing, compiled, inlined
 
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS = 0, 1, 2, 3
 """State of a contact: P = 0; y = 0; y_n = 0 and P_t = +mu P_n or -mu P_n."""
@@ -106,7 +106,7 @@ def relative_velocity(n: int, problem: Problem, r: int) -> float:
     return y
 
 
-@inlined
+@borrowing
 def solve_linear(B: np.ndarray, rows: np.ndarray, size: int) -> bool:
     """Gaussian elimination with partial pivoting, in place; False for a singular matrix."""
     for k in range(size):

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from dlm.metrics import object_trajectory_loss, rotation_error, translation_error
-from dlm.simulator.commands import command
 from dlm.simulator.laws import trace
 from dlm.simulator.path import desired_motion
 from dlm.simulator.rollout import (
@@ -131,7 +130,6 @@ def planned_commands(
     numbers = settings.numbers
     run, item = run_of_plans(batch.arrays, plans, numbers), item_of(batch.arrays, plans, 0, numbers)
     table = table_of(item, numbers)
-    command(table, item.positions, item.forces, item.world.stiffness, run.motion.commands)
     start_motion(item, table, run.motion)
     return run.motion.commands, run.motion.fingers[0]
 

@@ -118,19 +118,12 @@ def acceptable(item: Item) -> bool:
 
 
 @borrowing
-def execute(item: Item, table: Commands, run: Run) -> int:
-    """Commands and motion of one plan; how it ended."""
-    command(table, item.positions, item.forces, item.world.stiffness, run.motion.commands)
-    start_motion(item, table, run.motion)
-    return advance(item.world, run)
-
-
-@borrowing
 def start_motion(item: Item, table: Commands, motion: Motion) -> None:
-    """Object at rest at its first pose, fingers where the plan has them."""
+    """Commands of a plan, the object at rest at its first pose, and fingers where the plan has them."""
+    command(table, item.positions, item.forces, item.world.stiffness, motion.commands)
+    command(table, item.positions, item.forces, np.inf, motion.fingers[:1])
     for d in range(3):
         motion.poses[0, d], motion.velocities[0, d] = item.start[d], 0
-    command(table, item.positions, item.forces, np.inf, motion.fingers[:1])
 
 
 @borrowing
@@ -185,7 +178,7 @@ def move(world: World, motion: Motion, i: int, near: np.ndarray, work: Work) -> 
     freedom put that right, and so does a support.
     """
     poses, velocities, fingers, commands, _, _ = motion
-    velocity, finger_velocity, h = work.velocity, work.finger_velocity, world.h
+    velocity, finger_velocity, h = work.body[0].velocity, work.finger_velocity, world.h
     contacts = work.problem.contacts
     before = State(poses[i], velocities[i], fingers[i])
     n, exact = solve_step(world, before, commands[i : i + 2], work)
@@ -270,7 +263,8 @@ def execute_batch(scenes: SceneArrays, plans: Plans, settings: np.record) -> tup
         for t, d in np.ndindex((T, 3)):
             poses[b, t, d] = item.start[d]
         if acceptable(item):
-            ends[b] = execute(item, table_of(item, settings), run)
+            start_motion(item, table_of(item, settings), run.motion)
+            ends[b] = advance(item.world, run)
             for t, d in np.ndindex((T, 3)):
                 poses[b, t, d] = run.motion.poses[t * settings.substeps, d]
     return poses, ends

@@ -26,25 +26,25 @@ CORRECTION, FASTEST_CORRECTION = 0.2, 0.5
 """Share of a deeper penetration that one step removes, and the greatest speed at which [m/s]."""
 
 
+BODY = np.dtype(
+    [(name, "f8", 3) for name in ("predicted", "free", "velocity", "guess", "momentum")]
+    + [(name, "f8", (3, 3)) for name in ("mobility", "resistance")]
+)
+"""Velocities of the object: predicted without any forces but gravity, free of contacts, at the end of the step; mobility:
+velocity per impulse.  With friction of the support: resistance velocity = momentum + impulses, linearised at a guess."""
+
+
 class Work(NamedTuple):
     """Scratch memory of one step, and its results.
 
-    mobility (3, 3): velocity per impulse.  Velocities of the object (3,): predicted without any forces
-    but gravity, free of contacts, and at the end of the step; of the fingers (C, 2): free of contacts, and at the end.
-    With friction of the support: resistance (3, 3) and momentum (3,), resistance v = momentum + impulses; the velocity that
-    was guessed (3,), and directions (V, 2) that the friction opposes.
+    body (1,) of BODY, in one piece because calls pass arrays one by one.  Velocities of the fingers (C, 2): free of contacts,
+    and at the end of the step.  directions (V, 2) that the friction of the support opposes.
     """
 
     problem: Problem
-    mobility: np.ndarray
-    predicted: np.ndarray
-    free: np.ndarray
-    velocity: np.ndarray
+    body: np.ndarray
     finger_free: np.ndarray
     finger_velocity: np.ndarray
-    resistance: np.ndarray
-    momentum: np.ndarray
-    guess: np.ndarray
     directions: np.ndarray
 
 
@@ -53,27 +53,21 @@ def work_for(fingers: int, walls: int, vertices: int) -> Work:
     """Scratch memory for scenes with at most so many: a finger touches two facets of a corner, a wall any vertex."""
     return Work(
         problem_for(2 * fingers + vertices * walls),
-        np.zeros((3, 3)),
-        np.zeros(3),
-        np.zeros(3),
-        np.zeros(3),
+        np.zeros(1, BODY),
         np.zeros((fingers, 2)),
         np.zeros((fingers, 2)),
-        np.zeros((3, 3)),
-        np.zeros(3),
-        np.zeros(3),
         np.zeros((vertices, 2)),
     )
 
 
-@borrowing
+@inlined
 def solve_step(world: World, state: State, commands: np.ndarray, work: Work) -> tuple[int, bool]:
-    """Velocities at the end of the step, into work.velocity and work.finger_velocity.
+    """Velocities at the end of the step, into work.body and work.finger_velocity.
 
     commands (2, C, 2): at the step's begin and end.  Returns the number of contacts and whether their problem was solved.
     """
     q, v, p = state
-    predicted, finger_free = work.predicted, work.finger_free
+    predicted, finger_free = work.body[0].predicted, work.finger_free
     predicted[0], predicted[1], predicted[2] = v[0], v[1] - world.h * world.gravity, v[2]
     follow, lead = spring_rates(world)
     for c in range(len(p)):
@@ -85,7 +79,7 @@ def solve_step(world: World, state: State, commands: np.ndarray, work: Work) -> 
     _contact_rows(n, q, work.problem)
     if world.support > 0:
         return n, _with_support(n, world, state, work)
-    W, free = work.mobility, work.free
+    W, free = work.body[0].mobility, work.body[0].free
     for d in range(3):
         W[d, 0] = W[d, 1] = W[d, 2] = 0
         W[d, d] = 1 / (world.inertia if d == 2 else world.mass)
@@ -99,7 +93,7 @@ def coasts(n: int, world: World, before: State, work: Work) -> bool:
     if world.support > 0:
         return False
     contacts, rows, _, _ = work.problem
-    v, after = before.velocity, work.velocity
+    v, after = before.velocity, work.body[0].velocity
     for i in range(n):
         row = rows[2 * i]
         slower = row.x * (v[0] - after[0]) + row.y * (v[1] - after[1]) + row.turn * (v[2] - after[2])
@@ -160,7 +154,8 @@ def contact_scale(world: World, lever: float, give: float) -> float:
 def assemble_problem(n: int, world: World, work: Work) -> None:
     """A = J W J^T + finger mobility + compliance and c = relative velocity without impulses + bias."""
     contacts, rows, A, _ = work.problem
-    W, free, finger_free, give = work.mobility, work.free, work.finger_free, finger_mobility(world)
+    W, free = work.body[0].mobility, work.body[0].free
+    finger_free, give = work.finger_free, finger_mobility(world)
     for r in range(2 * n):
         row, contact = rows[r], contacts[r // 2]
         f = contact.finger
@@ -196,7 +191,7 @@ def _solve_velocities(n: int, world: World, work: Work) -> bool:
 def _apply_impulses(n: int, world: World, work: Work) -> None:
     """Velocities of object and fingers from the impulses."""
     contacts, rows, _, _ = work.problem
-    velocity, free, finger_velocity = work.velocity, work.free, work.finger_velocity
+    body, finger_velocity = work.body[0], work.finger_velocity
     give = finger_mobility(world)
     for c in range(len(finger_velocity)):
         finger_velocity[c, 0], finger_velocity[c, 1] = work.finger_free[c, 0], work.finger_free[c, 1]
@@ -209,36 +204,37 @@ def _apply_impulses(n: int, world: World, work: Work) -> None:
         if f >= 0:
             finger_velocity[f, 0] -= give * row.x * row.P
             finger_velocity[f, 1] -= give * row.y * row.P
-    W = work.mobility
+    velocity, W = body.velocity, body.mobility
     for k in range(3):
-        velocity[k] = free[k] + W[k, 0] * x + W[k, 1] * y + W[k, 2] * turn
+        velocity[k] = body.free[k] + W[k, 0] * x + W[k, 1] * y + W[k, 2] * turn
 
 
-@borrowing
+@inlined
 def _with_support(n: int, world: World, state: State, work: Work) -> bool:
     """Contacts and support friction together, by Newton steps in velocity and friction."""
+    body, w, exact = work.body[0], work.directions, True
     for d in range(3):
-        work.guess[d] = work.predicted[d]
-    support.directions(world, state.pose, work.guess, work.directions)
-    exact = True
+        body.guess[d] = body.predicted[d]
+    support.directions(world, state.pose, body.guess, w)
     for _ in range(support.ITERATIONS):
         support_mobility(world, state, work)
         exact = _solve_velocities(n, world, work)
-        change = support.update_directions(world, state.pose, work.guess, work.velocity, work.directions)
+        change = support.update_directions(world, state.pose, body.guess, body.velocity, w)
         for d in range(3):
-            work.guess[d] = work.velocity[d]
+            body.guess[d] = body.velocity[d]
         if change < support.TOLERANCE:
             return exact
     return False
 
 
-@borrowing
+@inlined
 def support_mobility(world: World, state: State, work: Work) -> None:
     """Mobility and contact-free velocity with the support friction linearised at the guess and its directions."""
-    W, b = work.mobility, work.momentum
+    body = work.body[0]
+    W, b = body.mobility, body.momentum
     for d in range(3):
         b[d] = (world.inertia if d == 2 else world.mass) * state.velocity[d]
-    support.linearise(world, state.pose, work.guess, work.directions, (work.resistance, b))
-    support.invert(work.resistance, W)
+    support.linearise(world, state.pose, body.guess, work.directions, (body.resistance, b))
+    support.invert(body.resistance, W)
     for d in range(3):
-        work.free[d] = W[d, 0] * b[0] + W[d, 1] * b[1] + W[d, 2] * b[2]
+        body.free[d] = W[d, 0] * b[0] + W[d, 1] * b[1] + W[d, 2] * b[2]

@@ -26,7 +26,17 @@ from dlm.metrics import object_trajectory_loss, rotation_error, translation_erro
 from dlm.simulator import Execution, Scene, SceneBatch, SimulatorSettings, replay
 from dlm.simulator.gradient import rollout
 from dlm.simulator.mujoco import replay_in_mujoco
-from dlm.simulator.rollout import Plans, Run, execute, item_of, load_parts, move, run_of_plans, table_of
+from dlm.simulator.rollout import (
+    Plans,
+    Run,
+    advance,
+    item_of,
+    load_parts,
+    move,
+    run_of_plans,
+    start_motion,
+    table_of,
+)
 from dlm.simulator.step import solve_step
 from dlm.simulator.world import State, World
 from expert.geometry.pose import Array
@@ -189,7 +199,8 @@ def reference_gradient(
     def run(values: Array) -> tuple[float, np.ndarray]:
         plans = Plans(values[:1].copy(), values[1:] * scene.stiffness, loaded, start)
         item, memory = item_of(batch.arrays, plans, 0, numbers), run_of_plans(batch.arrays, plans, numbers)
-        execute(item, table_of(item, numbers), memory)
+        start_motion(item, table_of(item, numbers), memory.motion)
+        advance(item.world, memory)
         knots = memory.motion.poses[:: numbers["substeps"]]
         return float((knots * weights).sum()), modes(item.world, memory)
 
