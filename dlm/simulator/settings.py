@@ -1,13 +1,16 @@
 """How to simulate and how to execute a plan; every layer of the execution can be switched off by itself."""
 
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from expert.world.values import require
 
 Gradient = Literal["finite_difference", "implicit"]
+MOST_SUBSTEPS = 100_000
+"""Per knot interval: states at all of them are kept."""
+TINY = np.finfo(float).tiny
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,11 +39,11 @@ class Execution:
 
     def __post_init__(self) -> None:
         for name in ("approach", "release"):
-            value = getattr(self, name)
-            require(0 <= value < 0.5, f"execution.{name}", "a fraction in [0, 0.5)", value)
+            _require_number(self, f"execution.{name}", "a fraction in [0, 0.5)", 0, 0.5)
         for name in ("lift_off", "parking"):
-            value = getattr(self, name)
-            require(0 <= value < np.inf, f"execution.{name}", "a length >= 0 in metres", value)
+            _require_number(self, f"execution.{name}", "a length >= 0 in metres", 0, np.inf)
+        for name in ("material_point", "eased", "compensation", "rolling", "handover"):
+            _require_switch(self, f"execution.{name}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,20 +70,23 @@ class SimulatorSettings:
     execution: Execution = field(default_factory=Execution)
 
     def __post_init__(self) -> None:
-        for name, low, high, expected in (
-            ("substeps", 1, np.inf, "at least 1"),
-            ("finger_radius", TINY, np.inf, "a positive length in metres"),
-            ("damping", 0, np.inf, "a number >= 0"),
-            ("regularization", TINY, 1, "a share in (0, 1)"),
-            ("difference_step", TINY, np.inf, "a positive length in metres"),
+        whole = isinstance(self.substeps, int | np.integer) and not isinstance(self.substeps, bool)
+        expected = f"a whole number of 1 to {MOST_SUBSTEPS}"
+        require(whole and 1 <= self.substeps <= MOST_SUBSTEPS, "simulator.substeps", expected, self.substeps)
+        for name, expected, low, high in (
+            ("finger_radius", "a positive length in metres", TINY, np.inf),
+            ("damping", "a number >= 0", 0, np.inf),
+            ("regularization", "a share in (0, 1)", TINY, 1),
+            ("difference_step", "a positive length in metres", TINY, np.inf),
+            ("kappa", "a positive number, inf for rigid contact", TINY, None),
+            ("step_error", "a positive number, inf for steps that are never cut", TINY, None),
         ):
-            value = getattr(self, name)
-            require(low <= value < high, f"simulator.{name}", expected, value)
-        for name, meaning in (("kappa", "rigid contact"), ("step_error", "steps that are never cut")):
-            value = getattr(self, name)
-            require(value > 0, f"simulator.{name}", f"a positive number, inf for {meaning}", value)
-        methods = ("finite_difference", "implicit")
+            _require_number(self, f"simulator.{name}", expected, low, high)
+        _require_switch(self, "simulator.frictionless")
+        methods = get_args(Gradient)
         require(self.gradient in methods, "simulator.gradient", " or ".join(methods), self.gradient)
+        fits = isinstance(self.execution, Execution)
+        require(fits, "simulator.execution", "an Execution", self.execution)
 
     @property
     def numbers(self) -> Any:
@@ -90,7 +96,16 @@ class SimulatorSettings:
         return np.array(tuple(values), NUMBERS)[()]
 
 
-TINY = np.finfo(float).tiny
+def _require_number(settings: object, field: str, expected: str, low: float, high: float | None) -> None:
+    """A number in [low, high), or from low on, infinity included, where high is None."""
+    value = getattr(settings, field.split(".")[1])
+    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    require(number and low <= value and (high is None or value < high), field, expected, value)
+
+
+def _require_switch(settings: object, field: str) -> None:
+    value = getattr(settings, field.split(".")[1])
+    require(isinstance(value, bool | np.bool_), field, "true or false", value)
 
 
 def _numbers(settings: type) -> list[tuple[str, Any]]:
