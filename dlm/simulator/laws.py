@@ -73,8 +73,8 @@ def _note_contact(k: int, world: World, before: np.ndarray, work: Work, out: np.
         return 0.0
     out.slip -= tangent.x * work.finger_velocity[f, 0] + tangent.y * work.finger_velocity[f, 1]
     turn = (normal.P * normal.turn + tangent.P * tangent.turn) / world.h
-    mid = 0.5 * (before + after)
-    return world.h * (out.fx * mid[0] + out.fy * mid[1] + turn * mid[2])
+    dx, dy, angle = before[0] + after[0], before[1] + after[1], before[2] + after[2]
+    return world.h * (out.fx * (0.5 * dx) + out.fy * (0.5 * dy) + turn * (0.5 * angle))
 
 
 @compiled
