@@ -83,7 +83,7 @@ def collect(world: World, now: Moment, out: np.ndarray) -> int:
                 n = _add_finger(world, now, c, (np.int64(FACET), other), out, n)
     for w in range(len(world.walls)):
         n = _add_wall(world, now, w, out, n)
-    return n
+    return int(n)
 
 
 @borrowing

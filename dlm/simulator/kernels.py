@@ -6,16 +6,17 @@ borrow their arrays, and count nothing.
 """
 
 from functools import partial
+from typing import Any
 
 from numba import njit
 
-_kernel = partial(njit, cache=True, error_model="numpy", no_cfunc_wrapper=True)
+_kernel: Any = partial(njit, cache=True, error_model="numpy", no_cfunc_wrapper=True)
 
-compiled = partial(_kernel, _nrt=True, forceinline=False)
+compiled: Any = partial(_kernel, _nrt=True, forceinline=False)
 """For functions that make arrays, or return some."""
-borrowing = partial(_kernel, _nrt=False, forceinline=False)
+borrowing: Any = partial(_kernel, _nrt=False, forceinline=False)
 """For functions that work on their callers' arrays: they make none, and return none, nor tuples with arrays."""
-inlined = partial(_kernel, _nrt=False, forceinline=True, no_cpython_wrapper=True)
+inlined: Any = partial(_kernel, _nrt=False, forceinline=True, no_cpython_wrapper=True)
 """The same, as a part of the machine code of whoever calls: a call hands over every array of every tuple, one by one.
 
 Python cannot call them."""
