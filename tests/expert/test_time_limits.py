@@ -33,8 +33,9 @@ def compiled() -> None:
 
 
 @pytest.mark.parametrize(("kind", "method"), [("cage", "swept"), ("grasp", "goal_cell")])
-def test_a_gear_overruns_no_limit(kind: str, method: str) -> None:
-    assert spent(kind, method, 0.1 * hard_polygon(np.random.default_rng(0), "gear")) <= 1.1 * LIMIT + 1
+@pytest.mark.parametrize(("family", "seed"), [("gear", 0), ("ring", 1028)])
+def test_gears_and_rings_overrun_no_limit(kind: str, method: str, family: str, seed: int) -> None:
+    assert spent(kind, method, 0.1 * hard_polygon(np.random.default_rng(seed), family)) <= 1.1 * LIMIT + 1
 
 
 @pytest.mark.slow

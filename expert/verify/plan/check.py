@@ -14,7 +14,7 @@ from expert.errors import InvalidProblem
 from expert.geometry.polygon import signed_distance
 from expert.geometry.pose import Array, cross, to_body
 from expert.problems.contact import FREE, ContactTask, Plan
-from expert.verify.plan.claims import EFFORT, NUMBERS, check_infeasible, with_claims
+from expert.verify.plan.claims import EFFORT, check_bound, check_infeasible, with_claims
 from expert.verify.plan.environment import environment_checks
 from expert.verify.plan.report import Check, PlanReport
 
@@ -43,8 +43,7 @@ def verify(task: ContactTask, answer: Plan | None) -> PlanReport:
     elif answer.status == "infeasible":
         report = check_infeasible(task, answer)
     else:
-        reason = "no plan was found: nothing to check"
-        report = PlanReport(verdict="unknown", claim=answer.status, reason=reason, claimed=NUMBERS)
+        report = check_bound(task, answer)
     return replace(report, claimed=(*report.claimed, *EFFORT), seconds=budget.spent)
 
 

@@ -47,6 +47,17 @@ def _gap(task: ContactTask, plan: Plan) -> tuple[Check, ...]:
     )
 
 
+def check_bound(task: ContactTask, answer: Plan) -> PlanReport:
+    """unknown, since there is no plan to judge; whether its bound holds is said all the same."""
+    report = PlanReport(verdict="unknown", claim=answer.status, reason="no plan was found: nothing to check")
+    if answer.certificate is None:
+        return replace(report, claimed=NUMBERS)
+    against = objection(task, answer.certificate, answer.bound)
+    proved = "no plan was found; that none costs less than the bound is proved"
+    claimed = tuple(name for name in NUMBERS if name != "bound")
+    return replace(report, reason=against or proved, claimed=claimed)
+
+
 def check_infeasible(task: ContactTask, answer: Plan) -> PlanReport:
     """sound where the certificate proves that there is no plan, or some step by itself admits no force balance; else unknown.
 

@@ -17,6 +17,7 @@ SOLVED = {
     "contact_trajectory": "contact_trajectory/transverse_rotation_two_fingers.yaml",
     "contact_trajectory on a wall": "contact_trajectory/block_pivot_two_fingers.yaml",
     "no contact_trajectory": "contact_trajectory/block_lift_one_finger_infeasible.yaml",
+    "no sequence of contacts": "contact_trajectory/tool_pivot_one_finger.yaml",
     "cage": "cage/m_grippers.yaml",
     "push": "push/box_ellipsoid.yaml",
 }
@@ -75,6 +76,9 @@ def lies(key: str, value: Any) -> Iterator[Any]:
     elif key == "path":  # every one of them is looked at in full
         yield value[::-1]
         yield [*value[:-1], [*value[-1][:-1], [value[-1][-1][0] - 0.02, value[-1][-1][1]]]]
+    elif key == "certificate":  # what it proves is looked at in tests/expert/verify/plan/test_optimality.py
+        yield {}
+        yield {**value, "steps": value["steps"][:-4]}
     elif isinstance(value, str):
         yield value + " "
     elif isinstance(value, int):

@@ -155,6 +155,21 @@ def test_the_proof_knows_that_fingers_do_not_fit_under_a_low_block(height: float
     assert report.verdict == verdict
 
 
+def test_a_bound_without_a_plan_is_proved_or_not_but_no_verdict() -> None:
+    task = read_problem(GALLERY / "transverse_rotation_two_fingers.yaml").task
+    answer = solve(task, node_limit=1)
+    assert answer.status == "time_limit"
+    assert answer.bound > 0
+    report = verify(task, answer)
+    assert (report.verdict, "bound" in report.claimed) == ("unknown", False)
+    assert "is proved" in report.reason
+    higher = verify(task, replace(answer, bound=1e3 * answer.bound))
+    assert higher.verdict == "unknown"
+    assert "proved" not in higher.reason
+    without = verify(task, replace(answer, certificate=None))
+    assert "bound" in without.claimed
+
+
 def test_stated_numbers_that_are_not_finite_are_no_bound() -> None:
     task, plan = lifted_block()
     report = verify(task, replace(plan, bound=-np.inf, status="feasible", certificate={}))
