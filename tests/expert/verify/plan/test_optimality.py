@@ -4,16 +4,22 @@ import base64
 import copy
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from expert.contact import solve
+from expert.geometry.convex import free_regions
 from expert.problems.contact import ContactTask, Plan
+from expert.verify.plan import optimality
 from expert.verify.plan.optimality import covers_the_outside, objection
+from expert.world.shape import Body
+from tests.support.polygons import HARD, hard_polygon
 from tests.support.random_tasks import floor_task, table_task
 
+POSES = ("poses", "before", "after")
 LEAST_WRONG = 1e-6
 """Relative excess of a bound that is certainly wrong."""
 
@@ -89,6 +95,19 @@ def test_parts_that_are_missing_are_asked_for() -> None:
             container[key] = whole
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_free_regions_cover_the_outside(seed: int) -> None:
-    assert covers_the_outside(floor_task(np.random.default_rng(seed)))
+@pytest.mark.parametrize("seed", [*range(6), 87])
+def test_free_regions_cover_the_outside_and_none_may_be_missing(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    task = floor_task(np.random.default_rng([seed, 5]), facets=3 + seed % 4)
+    assert covers_the_outside(task)
+    monkeypatch.setattr(optimality, "free_regions", lambda *known: free_regions(*known)[1:])
+    assert not covers_the_outside(task)
+
+
+@pytest.mark.parametrize("family", HARD)
+def test_free_regions_cover_the_outside_of_odd_shapes(family: str) -> None:
+    body, _ = Body.uniform(0.1 * hard_polygon(np.random.default_rng(1), family), 0.01)
+    task = floor_task(np.random.default_rng(1), facets=4)
+    raised = replace(task.trajectory, **{k: getattr(task.trajectory, k) + [0, 1, 0] for k in POSES})
+    assert covers_the_outside(replace(task, body=body, trajectory=raised))
