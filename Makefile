@@ -37,7 +37,7 @@ lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/codespell expert datasets dlm examples tests docs configs README.md CHANGELOG.md train.py evaluate.py
+	$(BIN)/codespell expert datasets dlm certmanip examples tests docs configs README.md CHANGELOG.md train.py evaluate.py
 
 bench: setup
 	@status=0; for file in tests/benchmarks/[a-z]*.py; do \
@@ -75,5 +75,5 @@ figures: setup
 	$(BIN)/python examples/against_force_closure.py -o docs/gallery/grasp_force_closure.png
 
 clean:
-	find expert datasets dlm tests -name __pycache__ -prune -exec rm -rf {} +
+	find expert datasets dlm certmanip tests -name __pycache__ -prune -exec rm -rf {} +
 	rm -rf .venv .mypy_cache .pytest_cache .ruff_cache .import_linter_cache *.egg-info

@@ -4,7 +4,6 @@ import functools
 import os
 import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, ParamSpec
 
 import hydra
@@ -16,9 +15,9 @@ from omegaconf import DictConfig, ListConfig
 from omegaconf.errors import OmegaConfBaseException
 
 from expert.errors import ExpertError, InvalidProblem
+from expert.shipped import CONFIGS
 from expert.world.values import require
 
-CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 BAD_INPUT, FAILED, INTERRUPTED = 2, 1, 130
 
 P = ParamSpec("P")

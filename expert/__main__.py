@@ -15,12 +15,20 @@ from typing import NoReturn, get_args, get_type_hints
 from expert import commands
 from expert.errors import ExpertError, InvalidProblem
 from expert.files import FORMATS
+from expert.shipped import located
+
+CODES = """exit codes: 0 solved, sound or drawn; 1 refuted, or a solver failed; 2 bad input; 3 proved infeasible;
+4 limit hit or unknown; 130 interrupted"""
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code; whatever is wrong with the input becomes one line on stderr."""
-    options = _parser().parse_args(arguments)
+def main(arguments: Sequence[str] | None = None, program: str = "python -m expert") -> int:
+    """Run one command and return its exit code; whatever is wrong with the input becomes one line on stderr.
+
+    program: how the user calls it, for help.
+    """
+    options = _parser(program).parse_args(arguments)
     try:
+        options.file = located(options.file)
         code: int = options.command(options)
     except InvalidProblem as error:
         print(f"error: {options.file}: {error}", file=sys.stderr)
@@ -49,23 +57,30 @@ class _Parser(argparse.ArgumentParser):
         self.exit(commands.BAD_INPUT, f"error: {message}; see {self.prog} --help\n")
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="python -m expert", description="Plan, check and draw planar manipulation.")
+def _parser(program: str) -> argparse.ArgumentParser:
+    parser = _Parser(prog=program, description="Plan, check and draw planar manipulation.", epilog=CODES)
     subparsers = parser.add_subparsers(required=True, metavar="solve | verify | draw")
 
-    solve = subparsers.add_parser("solve", help="read a problem file, write a solution file")
-    solve.add_argument("file", type=Path, help="problem file, YAML or JSON (docs/files.md)")
+    def add(name: str, purpose: str, example: str) -> argparse.ArgumentParser:
+        epilog = f"example: {program} {name} {example}\n\n{CODES}"
+        layout = argparse.RawDescriptionHelpFormatter
+        return subparsers.add_parser(
+            name, help=purpose, description=purpose, epilog=epilog, formatter_class=layout
+        )
+
+    solve = add("solve", "read a problem file, write a solution file", "shipped:cage/t_4 -o cage.json")
+    solve.add_argument("file", type=Path, help="problem file, YAML or JSON, in SI units (docs/files.md)")
     solve.add_argument("-o", "--output", type=Path, help="solution file, JSON; without it nothing is written")
     solve.add_argument("--method", help=f"instead of the file's options.method.  {_methods()}")
     solve.add_argument("--summary", action="store_true", help="print one JSON line")
     solve.set_defaults(command=commands.solve)
 
-    verify = subparsers.add_parser("verify", help="check a solution file without solving anything")
+    verify = add("verify", "check a solution file without solving anything", "cage.json -o certificate.json")
     verify.add_argument("file", type=Path, help="solution file, or a problem file that states what to check")
     verify.add_argument("-o", "--output", type=Path, help="certificate file, JSON")
     verify.set_defaults(command=commands.verify)
 
-    draw = subparsers.add_parser("draw", help="picture or animation of a solution file")
+    draw = add("draw", "picture or animation of a solution file", "cage.json -o cage.png")
     draw.add_argument("file", type=Path, help="solution file")
     draw.add_argument("-o", "--output", type=Path, required=True, help=".png, .svg, .pdf, .gif or .mp4")
     draw.add_argument("--view", help="one part of the picture of a cage: workspace, slice or component")

@@ -83,7 +83,7 @@ def _brief(value: Any) -> str:
 def verify(options: argparse.Namespace) -> int:
     """Check a solution file, or a problem file that states what there is to check; write a certificate."""
     with _reserved(options) as output:
-        problem, answer = _read_either(load(options.file))
+        problem, answer = read_either(load(options.file))
         with _progress(f"checking {options.file.name}"):
             report = _interruptible(lambda: KINDS[problem.kind].verify(problem.task, answer))
         print(report)
@@ -96,14 +96,14 @@ def draw(options: argparse.Namespace) -> int:
     """Draw a solution file, or a problem file that states what there is to draw."""
     with _reserved(options):
         pass  # the drawing writes its file itself
-    problem, answer = _read_either(load(options.file))
+    problem, answer = read_either(load(options.file))
     with _progress(f"drawing {options.output.name}"):
         KINDS[problem.kind].draw(problem.task, answer, options.output, options.view)
     print(f"picture in {options.output}")
     return SOLVED
 
 
-def _read_either(data: dict[str, Any]) -> tuple[Problem, Any]:
+def read_either(data: dict[str, Any]) -> tuple[Problem, Any]:
     """Problem and answer of a solution file; no answer for a problem file."""
     if "solution" not in data:
         return problem_of(data), None

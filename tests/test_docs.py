@@ -83,7 +83,7 @@ def test_the_index_lists_every_page() -> None:
     } <= listed
 
 
-NAMED = re.compile(r"`((?:expert|datasets|dlm|tests|configs|examples)/[\w/.-]+)(?:::(\w+))?`")
+NAMED = re.compile(r"`((?:expert|datasets|dlm|certmanip|tests|configs|examples)/[\w/.-]+)(?:::(\w+))?`")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
@@ -127,7 +127,7 @@ def test_pages_that_the_code_names_exist() -> None:
     sources = [
         *(
             path
-            for room in ("expert", "datasets", "dlm", "configs", "examples")
+            for room in ("expert", "datasets", "dlm", "certmanip", "configs", "examples")
             for path in (ROOT / room).rglob("*.*")
         )
     ]

@@ -1,12 +1,15 @@
 """Every command of the documents is understood by the program that it calls; short ones of the how-to pages are run."""
 
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from omegaconf import DictConfig
 
+from certmanip.commands import COMMANDS as ENTRANCES
+from certmanip.overrides import overrides
 from tests.support.commands import ROOT, blocks, commands, fresh_checkout, parse, run, words
 
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -37,12 +40,16 @@ def test_a_command_is_understood(
         )
         return
     if program == "pip":
-        extras = re.findall(r"\[(\w+)\]", command)
+        extras = re.findall(r"(?<=[\[,])\w+(?=[\],])", command)
         assert all(f"\n{extra} = [" in (ROOT / "pyproject.toml").read_text() for extra in extras)
         return
-    name, *arguments = arguments[1:] if arguments[0] == "-m" else arguments
-    if name in HYDRA:
-        assert composed(HYDRA[name], *(word for word in arguments if not word.startswith("-")))
+    if program == "certmanip":
+        name, *arguments = arguments if ENTRANCES[arguments[0]].config else ("expert", *arguments)
+        arguments = overrides(ENTRANCES[name], arguments) if name in ENTRANCES else arguments
+    else:
+        name, *arguments = arguments[1:] if arguments[0] == "-m" else arguments
+    if name in HYDRA or name in ENTRANCES:
+        assert composed(HYDRA.get(name, name), *(word for word in arguments if not word.startswith("-")))
     elif name in BARE:
         assert len(arguments) == 1
     elif len(arguments) == 1:  # mentioned in passing: `python -m expert verify`
@@ -61,6 +68,15 @@ def test_a_command_is_understood(
 def test_a_wrong_command_is_not_understood(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(SystemExit):
         parse("expert", ["solve", "problem.yaml", "--colour", "red"], monkeypatch)
+
+
+@pytest.mark.slow
+def test_snippets_of_the_python_page_run(tmp_path: Path) -> None:
+    snippets = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs/how-to/python.md").read_text(), re.M | re.S)
+    assert len(snippets) == 4
+    output = run([sys.executable, "-c", "\n".join(snippets)], fresh_checkout(tmp_path))
+    assert re.search(r"^caged caged$.*^optimal sound \(4, 1, 2\)$.*^planned .*^sound$", output, re.M | re.S)
+    assert (tmp_path / "cage.png").stat().st_size > 1000
 
 
 @pytest.mark.slow

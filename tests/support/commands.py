@@ -17,7 +17,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent.parent
 CODE = re.compile(r"^```(?:bash|sh)?\n(.*?)^```$", flags=re.MULTILINE | re.DOTALL)
 LINKED = (
-    "expert", "datasets", "dlm", "configs", "examples", "tests", "docs", "train.py", "evaluate.py", "Makefile",
+    "expert", "datasets", "dlm", "certmanip", "configs", "examples", "tests", "docs", "train.py", "evaluate.py", "Makefile",
 )  # fmt: skip
 
 
@@ -25,7 +25,7 @@ def blocks(page: str) -> Iterator[list[str]]:
     """Commands of each fenced block of shell code, without their comments."""
     for block in CODE.findall(page):
         lines = (line.split("  #")[0].strip() for line in block.splitlines())
-        if commands := [line for line in lines if re.match(r"(python|make|for|pip) ", line)]:
+        if commands := [line for line in lines if re.match(r"(python|certmanip|make|for|pip) ", line)]:
             yield commands
 
 
@@ -36,7 +36,7 @@ def commands(page: str) -> Iterator[str]:
     found += [
         line.split("  #")[0].strip() for line in re.findall(r"^    (python .*)$", outside, re.MULTILINE)
     ]
-    found += re.findall(r"`((?:python|make|pip) [^`]+)`", outside)
+    found += re.findall(r"`((?:python|certmanip|make|pip) [^`]+)`", outside)
     for command in found:
         loop = re.fullmatch(r"for name in ([^;]+); do (.*); done", command)
         names = loop[1].split() if loop else [""]
