@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from certmanip.notebook import page
 from expert.commands import read_either
 from expert.errors import InvalidProblem
 from expert.files import FORMATS, SCHEMA, Problem, problem_for, problem_of, write_problem, write_solution
@@ -89,8 +90,6 @@ class Case:
         return f"<{self.kind}: {self.status}>"
 
     def _repr_html_(self) -> str:
-        from certmanip.notebook import page
-
         return page(self)
 
 

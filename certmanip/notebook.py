@@ -4,15 +4,30 @@ import base64
 import tempfile
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, Protocol
 
 from expert.errors import InvalidProblem
-
-if TYPE_CHECKING:
-    from certmanip.cases import Case
+from expert.verify.report import Report
 
 
-def page(case: "Case") -> str:
+class Shown(Protocol):
+    """What is asked of a case here."""
+
+    @property
+    def answer(self) -> Any: ...
+
+    @property
+    def kind(self) -> str: ...
+
+    @property
+    def status(self) -> str: ...
+
+    def verify(self) -> Report: ...
+
+    def draw(self, path: Path) -> None: ...
+
+
+def page(case: Shown) -> str:
     """HTML that needs nothing else: kind and status; the report and the picture of what there is to check and to draw."""
     heading = f"<b>{escape(case.kind.replace('_', ' '))}</b>: {escape(case.status)}"
     if case.status == "open":
@@ -32,7 +47,7 @@ def page(case: "Case") -> str:
     return f"<div>{'<br>'.join(parts)}</div>"
 
 
-def _picture(case: "Case") -> str:
+def _picture(case: Shown) -> str:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "picture.png")
         case.draw(path)

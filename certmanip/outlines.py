@@ -156,14 +156,14 @@ def _read_picture(file: Path) -> Drawing:
     with explained():
         import cv2
 
-    image = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
-    require(image is not None, "outline", "a picture that OpenCV can read", str(file))
+    image, grey = (cv2.imread(str(file), way) for way in (cv2.IMREAD_UNCHANGED, cv2.IMREAD_GRAYSCALE))
+    if image is None or grey is None:
+        raise InvalidProblem("outline", expected="a picture that OpenCV can read", got=str(file))
     if image.ndim == 3 and image.shape[2] == 4 and np.ptp(image[..., 3]):
         mask = image[..., 3] > 127
     else:
-        grey = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
         _, white = cv2.threshold(grey, 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
-        mask = white > 0
+        mask = np.asarray(white) > 0
         border = np.concatenate([mask[0], mask[-1], mask[:, 0], mask[:, -1]])
         mask ^= border.mean() > 0.5
     contours, family = cv2.findContours(mask.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
