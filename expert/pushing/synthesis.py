@@ -103,29 +103,29 @@ def _worked_out(
     pushing: Pushing, nodes: Nodes, ends: Nodes, budget: Budget
 ) -> tuple[PushPlan | None, list[str]]:
     """The plan of least duration among the first that hold, if the checker agrees; and why others are none."""
-    waiting: list[PushPlan] = []
-    why: list[str] = []
     chains = itertools.islice(_chains(pushing, nodes, ends), TRIED)
-    for chain in itertools.chain(chains, [None]):
-        last = chain is None or budget.over
-        if chain is not None and not last:
-            pushes = _in_full(pushing, chain)
-            if isinstance(pushes, str):
-                why.append(pushes)
-                continue
-            seconds = duration(pushing.problem.finger, pushes)
-            waiting.append(PushPlan(status="solved", pushes=pushes, objective=seconds))
-        if last or len(waiting) >= ENOUGH:
-            for plan in sorted(waiting, key=lambda plan: plan.objective):
-                report = verify(pushing.problem, plan)
-                if report.verdict == "sound":
-                    return plan, why
-                names = ", ".join(check.name for check in report.violations)
-                why.append(f"the checker refuses ({names or report.reason})")
-            waiting = []
-        if last:
-            break
+    why: list[str] = []
+    while not budget.over and (few := _next_plans(pushing, chains, why, budget)):
+        for plan in sorted(few, key=lambda plan: plan.objective):
+            report = verify(pushing.problem, plan)
+            if report.verdict == "sound":
+                return plan, why
+            names = ", ".join(check.name for check in report.violations)
+            why.append(f"the checker refuses ({names or report.reason})")
     return None, why
+
+
+def _next_plans(pushing: Pushing, chains: Iterator[Array], why: list[str], budget: Budget) -> list[PushPlan]:
+    """Up to ENOUGH plans worked out from the next chains; why others are none is noted."""
+    found: list[PushPlan] = []
+    while len(found) < ENOUGH and not budget.over and (chain := next(chains, None)) is not None:
+        pushes = _in_full(pushing, chain)
+        if isinstance(pushes, str):
+            why.append(pushes)
+        else:
+            seconds = duration(pushing.problem.finger, pushes)
+            found.append(PushPlan(status="solved", pushes=pushes, objective=seconds))
+    return found
 
 
 def _chains(pushing: Pushing, nodes: Nodes, ends: Nodes) -> Iterator[Array]:

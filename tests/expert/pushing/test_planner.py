@@ -1,4 +1,5 @@
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,9 +8,9 @@ from expert.geometry.pose import rotation, wrapped
 from expert.pushing.goal import Goal, symmetries
 from expert.pushing.impulses import ANGLE, X, run
 from expert.pushing.planner import PRICES, Effort, Planner, Workspace, box
-from expert.pushing.refine import composed, refine
+from expert.pushing.refine import composed, refine, refine_plan
 from expert.pushing.search import beam_search, error_after, goals_from
-from expert.pushing.table import Grid, push_table
+from expert.pushing.table import Grid, again, push_table
 from expert.world.shape import Shape
 from tests.support.pushing import SQUARE, TEE, square_model, tee_model
 
@@ -187,3 +188,36 @@ def test_wrapped_angles_do_not_matter(planner):
     first, second = (planner.plan(p, np.array([60.0, 60.0]), np.zeros(2), 1.5) for p in (pose, turned))
     assert first.commands == pytest.approx(second.commands, abs=1e-6)
     assert wrapped(first.expected[2] - second.expected[2]) == pytest.approx(0, abs=1e-9)
+
+
+def test_a_table_under_another_model_holds_the_same_pushes(planner):
+    table = planner.table
+    same = again(planner.model, table)
+    for name in ("parameters", "shifts", "fingers", "steps", "first"):
+        assert (getattr(same, name) == getattr(table, name)).all()
+    heavier = replace(planner.model, block=replace(planner.model.block, gyration=9000.0))
+    other = again(heavier, table)
+    kept = {tuple(row) for row in table.parameters}
+    assert {tuple(row) for row in other.parameters} <= kept
+    assert np.abs(other.shifts[:, 2]).max() < np.abs(table.shifts[:, 2]).max()
+    assert other.first[-1] == len(other.parameters)
+
+
+def test_all_pushes_of_a_plan_make_it_exact_where_the_last_one_cannot():
+    model = square_model()
+    table = push_table(model, COARSE)
+    start, goal = np.zeros(3), Goal(SQUARE, np.zeros(2), np.array([75.0, 20.0, 0.4]), symmetric=False)
+    first = int(np.argmin(goal.error(composed(start[None], table.shifts))))
+    chain = table.parameters[[first, (first + 30) % len(table.parameters), first]]
+    before = goal.error(table_end(table, start, chain))
+    better, error = refine_plan(table, goal, start, chain, 30, 1.0, 1e-3)
+    assert error == pytest.approx(float(goal.error(table_end(table, start, better))), abs=1e-6)
+    assert error < 0.1 * before
+
+
+def table_end(table, start, chain):
+    """Pose after all pushes."""
+    pose = start[None]
+    for push in chain:
+        pose = composed(pose, table.outcomes(push[None])[0])
+    return pose[0]
