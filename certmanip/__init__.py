@@ -13,7 +13,7 @@ from importlib import import_module, metadata
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from certmanip.cases import Case, cage, case, certified_grasp, contact_trajectory, load
+    from certmanip.cases import Case, cage, case, certified_grasp, contact_trajectory, load, push
     from certmanip.installation import IncompleteInstallation
     from certmanip.outlines import outline
     from certmanip.video import infer
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from expert.problems.cage import Arrangement, CageProblem
     from expert.problems.contact import ContactTask, Cost, Robustness
     from expert.problems.grasp import GraspProblem
+    from expert.problems.push import PushProblem
     from expert.shipped import problem_names
     from expert.world.environment import Environment
     from expert.world.fingers import Fingers, Gripper
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from expert.world.walls import HalfPlane, Obstacle, Segment
 
 _MODULES = {
-    "certmanip.cases": ("Case", "cage", "case", "certified_grasp", "contact_trajectory", "load"),
+    "certmanip.cases": ("Case", "cage", "case", "certified_grasp", "contact_trajectory", "load", "push"),
     "certmanip.installation": ("IncompleteInstallation",),
     "certmanip.outlines": ("outline",),
     "certmanip.video": ("infer",),
@@ -38,6 +39,7 @@ _MODULES = {
     "expert.problems.cage": ("Arrangement", "CageProblem"),
     "expert.problems.contact": ("ContactTask", "Cost", "Robustness"),
     "expert.problems.grasp": ("GraspProblem",),
+    "expert.problems.push": ("PushProblem",),
     "expert.shipped": ("problem_names",),
     "expert.world.environment": ("Environment",),
     "expert.world.fingers": ("Fingers", "Gripper"),
@@ -65,6 +67,7 @@ __all__ = [
     "InvalidProblem",
     "Obstacle",
     "OutOfTime",
+    "PushProblem",
     "Robustness",
     "Segment",
     "Shape",
@@ -79,6 +82,7 @@ __all__ = [
     "named_shape",
     "outline",
     "problem_names",
+    "push",
 ]
 
 

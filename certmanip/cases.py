@@ -42,12 +42,12 @@ class Case:
 
     @property
     def kind(self) -> str:
-        """contact_trajectory, cage or certified_grasp."""
+        """contact_trajectory, cage, certified_grasp or push."""
         return self.problem.kind
 
     @property
     def task(self) -> Any:
-        """The problem as nouns: ContactTask, CageProblem, Arrangement or GraspProblem."""
+        """The problem as nouns: ContactTask, CageProblem, Arrangement, GraspProblem or PushProblem."""
         return self.problem.task
 
     @property
@@ -143,6 +143,23 @@ def certified_grasp(
 ) -> Case:
     """Which finger paths bring every start of a set into one grasp (Thesis 5.2)?  As `contact_trajectory`."""
     return _of_sections("certified_grasp", locals())
+
+
+def push(
+    *,
+    object: Outline,
+    start: ArrayLike,
+    goal: ArrayLike,
+    finger: Section,
+    limit_surface: Section | None = None,
+    tolerance: Section | None = None,
+    obstacles: Sequence[Section | Obstacle] | None = None,
+    workspace: ArrayLike | None = None,
+    clearance: float | None = None,
+    options: Section | None = None,
+) -> Case:
+    """Which straight pushes of one finger bring the object on a table to its goal?  As `contact_trajectory`."""
+    return _of_sections("push", locals())
 
 
 def _of_sections(kind: str, sections: Mapping[str, Any]) -> Case:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import certmanip
-from certmanip.cases import Case, cage, case, certified_grasp, contact_trajectory, load
+from certmanip.cases import Case, cage, case, certified_grasp, contact_trajectory, load, push
 from expert.errors import InvalidProblem
 from expert.files import FORMATS, read_problem, read_solution, write_problem
 from expert.problems.cage import Arrangement
@@ -20,7 +20,12 @@ from expert.world.shape import Body, Shape
 from expert.world.walls import HalfPlane, Segment
 
 SQUARE = 0.05 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-BUILDERS = {"contact_trajectory": contact_trajectory, "cage": cage, "certified_grasp": certified_grasp}
+BUILDERS = {
+    "contact_trajectory": contact_trajectory,
+    "cage": cage,
+    "certified_grasp": certified_grasp,
+    "push": push,
+}
 SLIDE = CONFIGS / "problem/contact_trajectory/block_slide_one_finger.yaml"
 
 
@@ -33,7 +38,7 @@ def test_every_kind_has_a_builder() -> None:
     assert BUILDERS.keys() == FORMATS.keys()
 
 
-@pytest.mark.parametrize("name", ["contact_trajectory/block_slide_one_finger", "cage/t_grippers", "certified_grasp/t"])  # fmt: skip
+@pytest.mark.parametrize("name", ["contact_trajectory/block_slide_one_finger", "cage/t_grippers", "certified_grasp/t", "push/round_the_wall"])  # fmt: skip
 def test_a_case_of_a_file_s_sections_is_the_file_s_problem(name: str) -> None:
     file = read_problem(CONFIGS / "problem" / f"{name}.yaml")
     sections = {key: file.data[key] for key in FORMATS[file.kind].KEYS if key in file.data}
