@@ -38,10 +38,11 @@ def main(cfg: DictConfig) -> None:
     known = ("running", "settled")
     require(cfg.batch_norm in known, "batch_norm", " or ".join(known), cfg.batch_norm)
     torch.set_num_threads(1)
-    tasks, extras = first(read_all(cfg.data), cfg.tasks), read_extras(cfg.extras)
+    every, extras = read_all(cfg.data), read_extras(cfg.extras)
+    tasks = first(every, cfg.tasks)
     trained = [read_trained(cfg.output, stage, seeds, build) for stage in stages]
     study = Study(
-        trained=[one.settled(tasks) for one in trained] if cfg.batch_norm == "settled" else trained,
+        trained=[one.settled(every) for one in trained] if cfg.batch_norm == "settled" else trained,
         tasks=tasks,
         simulator=build(cfg.simulator),
         baselines=unlearned() if cfg.perceived else {},
