@@ -1,6 +1,6 @@
 """Shipped weights of `model: neural`, and models with weights of a trained stage, whose proposals are checked.
 
-`python -m dlm.neural.weights runs/neural/seed_0/cvx.safetensors` makes the file of the package.
+`python -m dlm.neural.weights runs/neural/seed_0/mdr.safetensors` makes the file of the package.
 """
 
 import sys
