@@ -111,6 +111,7 @@ def _read_dxf(file: Path) -> Drawing:
         import ezdxf
         from ezdxf import path as dxf
         from ezdxf import units
+        from ezdxf.enums import InsertUnits
 
     try:
         drawing = ezdxf.readfile(file)
@@ -127,7 +128,8 @@ def _read_dxf(file: Path) -> Drawing:
         for path in paths
         if len(path)
     ]
-    known = units.conversion_factor(drawing.units, units.M) if drawing.units else None
+    unit = drawing.units if drawing.units in set(InsertUnits) else 0
+    known = units.conversion_factor(InsertUnits(unit), InsertUnits.Meters) if unit else None
     return _enclosed(lines, JOINED * extent), known
 
 
