@@ -150,7 +150,7 @@ def test_the_report_opens_in_a_browser(results: Path, tmp_path: Path) -> None:
     assert seen.count("<svg ") == 2 * models  # an example of the family and one of the test set
     assert seen.count("<img ") == 2 + 2 * 2  # curves, whole motions; video and strip of each example
     assert (
-        seen.count("<table") == 1 + 6 + 1 + 4 + 1
+        seen.count("<table") == 1 + 7 + 1 + 4 + 1
     )  # Table 4.1, its details, order, tests by data set, origin
     assert seen.rstrip().endswith("</html>")
 
@@ -178,14 +178,16 @@ def test_the_report_fits_desks_and_telephones(results: Path, tmp_path: Path, wid
 
 @pytest.mark.slow
 def test_the_command_that_training_names_judges_the_structured_model_too(workplace: Path) -> None:
+    """Six seconds of training on four tasks as they are, without variations, and the first guess plans them all."""
     model = ["experiment=smoke", "model=structured", "stage=structured/mdr", "output=runs/structured"]
     schedule = {
-        "iterations": 150,
-        "learning_rate": 3e-3,
+        "iterations": 200,
+        "learning_rate": 2e-4,
         "batch_size": 4,
-        "log_every": 150,
-        "save_every": 150,
+        "log_every": 200,
+        "save_every": 200,
     }
+    model += ["stages.mdr.loss.splitting=false", "stages.mdr.loss.mirroring=false"]
     said = finish(
         start("train.py", *model, *(f"schedule.{k}={v}" for k, v in schedule.items()), cwd=workplace)
     )
@@ -194,9 +196,8 @@ def test_the_command_that_training_names_judges_the_structured_model_too(workpla
     lines = json.loads((workplace / "runs" / "structured" / "table_4_1.json").read_text())["lines"]
     assert [line["model"] for line in lines] == ["no action", "MDR", "MIQP (oracle)"]
     learned = lines[1]["cells"]["train"]
-    # After so little training a first guess, which nothing checks, may have no plan for tasks that begin with a lift.
-    assert len(learned["unsolved"][0]) <= 2
-    assert learned["ratio"] < 1
+    assert learned["unsolved"] == [[]]
+    assert learned["ratio"] < 0.01
 
 
 @pytest.mark.slow

@@ -2,12 +2,21 @@
 
 import json
 import re
+import sys
 from pathlib import Path
 
 import pytest
 
 from certmanip.__main__ import main
 from certmanip.commands import COMMANDS
+
+
+@pytest.fixture(autouse=True)
+def fresh(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Programs that other tests have imported are run as if they had not."""
+    for command in COMMANDS.values():
+        for name in (command.program, f"{command.program}.__main__"):
+            monkeypatch.delitem(sys.modules, name, raising=False)
 
 
 def test_solve_verify_and_draw(
