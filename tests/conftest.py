@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import hypothesis
 import pytest
 import torch
 from hydra import compose, initialize_config_dir
@@ -16,6 +17,10 @@ from dlm.tasks import TaskBatch
 torch.set_num_threads(
     1
 )  # networks this small gain nothing from threads, and lose much where tests share cores
+
+# The first example of a property may compile; no test asserts times on the clock.
+hypothesis.settings.register_profile("untimed", deadline=None)
+hypothesis.settings.load_profile("untimed")
 
 
 @pytest.fixture(scope="session")

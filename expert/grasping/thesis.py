@@ -56,15 +56,18 @@ def solutions(
     for grasp in grasps:
         for hubs in fillings(grasp):
             programs.setdefault(hubs, []).append(grasp)
+    took = 0.0
     for hubs, alike in programs.items():
-        if budget.over:
+        if budget.left <= took:  # another one would take as long
             return
+        begun = budget.spent
         model = NestedCages(geometry, alike, knots, hubs=hubs)
         if model.feasible:
             model.minimise_bends(1.0 if name == "miqp1" else BEND_WEIGHT)
             if name == "miqp2":
                 model.milp.minimise(-model.common_alpha())
             push(model, 0)
+        took = budget.spent - begun
     while queue:
         _, _, cuts, model, x = heapq.heappop(queue)
         topology = topology_of(model, x)
